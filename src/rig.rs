@@ -8,8 +8,8 @@
 mod presets;
 mod validate;
 
-pub(crate) use validate::{CLIMB_PART, REGULATION_PART};
 pub use validate::{Bound, RigError};
+pub(crate) use validate::{CLIMB_PART, OVERPRESSURE_PART};
 
 /// Most steps a step table may hold.
 pub const MAX_STEPS: usize = 8;
@@ -174,6 +174,9 @@ pub struct Sensors {
     pub encoder_counts: f64,
     /// Preload sensor full scale, N, at 90 % of the converter; zero is at 5 %.
     pub preload_full_scale_n: f64,
+    /// Largest gain error of the preload sensor, relative: the preload limit is kept with it.
+    /// Derived: three deviations of a calibration within 0.5 %.
+    pub preload_error: f64,
     /// Tread compression full scale, mm, at 90 % of the converter; zero at 5 %.
     pub tread_full_scale_mm: f64,
     /// Code of the angle sensor at which the arm lies along the pillar, 0 to 16383.

@@ -11,6 +11,7 @@
 
 #![deny(clippy::float_arithmetic)]
 
+use crate::model::corner_profile::CornerProfile;
 use crate::numeric::{LowPass, LowPassState, checked, divide};
 use crate::rig::{Rig, RigError};
 use crate::units::{Direction, Millimetres, Newtons, Q16, Ratio, Travel, q16};
@@ -140,6 +141,14 @@ impl Tread {
         let spacing = SPACING * radius;
         let rate = 1e-9 * rig.tread.k_inf_pa_per_m * rig.rig.wheel_width_mm * spacing;
         let [from, to] = ROLLING.map(|part| part * radius);
+        // No farther than to where the first corner may touch.
+        let touch = CornerProfile::try_build(rig)?.first_contact(Direction::Deploy).to_num::<f64>();
+        let first = rig
+            .rig
+            .step_positions_mm
+            .first()
+            .map_or(to, |face| face - rig.rig.step_tolerance_mm - touch);
+        let to = to.min(first);
         let length = |mm| checked("rig.wheel_radius_mm", mm);
         Ok(Self {
             rate: checked("tread.k_inf_pa_per_m", rate)?,

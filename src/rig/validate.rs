@@ -1,14 +1,20 @@
 //! Checks of a rig's parameters.
 
 use super::Rig;
+use crate::sense::analog::{BROKEN_ABOVE, FULL_AT, ZERO_AT};
 
-/// Preload kept free below the limit for regulation, relative to the limit: gain of the preload
-/// sensor, and the spring's compression in a climb beyond the feed-forward. On the presets no rig
-/// within its tolerances exceeds the limit with it.
-pub(crate) const REGULATION_PART: f64 = 0.045;
+/// Preload kept free below the limit for regulation, relative to the limit, beside the error of the
+/// preload sensor: the spring's compression in a climb beyond the feed-forward. On the presets no
+/// rig within its tolerances exceeds the limit with it.
+const REGULATION_PART: f64 = 0.03;
 
 /// Part of the pre-tightener's slew that the spring may take while the wheel climbs.
 pub(crate) const CLIMB_PART: f64 = 0.9;
+/// Preload above the limit that counts as overpressure, relative: regulation and the spring that
+/// a climb compresses stay below it.
+pub(crate) const OVERPRESSURE_PART: f64 = 0.10;
+/// Largest part of an analogue sensor's full scale that it still shows.
+const SHOWN_PART: f64 = (BROKEN_ABOVE - ZERO_AT) / (FULL_AT - ZERO_AT);
 /// Steepest rise of the wheel over a corner, that behind lift-off.
 const LIFT_SLOPE: f64 = 0.5;
 /// Part by which the least planned speed exceeds the least useful one: creep of the tread and
@@ -21,6 +27,10 @@ const DIP_PART: f64 = 0.12;
 const ROLLING_RESERVE: f64 = 2.0;
 /// Friction coefficient, less its margin, with which a wheel is still reckoned to roll.
 const LEAST_GRIP: f64 = 1e-3;
+
+/// Largest travel of an encoder count, mm: at the least speed of a crossing, 1.5 mm/s, the speed
+/// observer then has three counts within its settling time.
+const LARGEST_COUNT_MM: f64 = 0.08;
 
 /// Least speed of the unloaded motor over the cruise speed, for regulation.
 const TOP_SPEED_RESERVE: f64 = 1.2;
@@ -67,6 +77,17 @@ pub enum RigError {
         /// Least upper value over the lower one.
         ratio: f64,
     },
+    /// A value with which the drive could not do its work.
+    Unable {
+        /// The value found.
+        value: f64,
+        /// What it has to keep.
+        bound: Bound,
+        /// What happens beyond it.
+        reason: &'static str,
+        /// Key of the parameter, then those that set the bound.
+        keys: &'static [&'static str],
+    },
     /// The arm cannot reach a wall at this radius.
     OutOfReach {
         /// Wheel-centre radius asked for, mm.
@@ -97,6 +118,10 @@ impl core::fmt::Display for RigError {
                 "{upper} = {value}: expected at least {:.1}, as {lower} = {other}",
                 other * ratio
             ),
+            Self::Unable { value, bound, reason, keys } => {
+                let key = keys.first().unwrap_or(&"rig");
+                write!(f, "{key} = {value}: expected {bound}: {reason}")
+            }
             Self::OutOfReach { radius_mm, min_mm, max_mm } => write!(
                 f,
                 "rig.arm_length_mm: the arm reaches wheel-centre radii from {min_mm:.1} to {max_mm:.1} mm, expected to include {radius_mm:.1} mm"
@@ -120,6 +145,7 @@ impl RigError {
             ],
             Self::StepBeyondTravel { .. } => &["rig.step_positions_mm", "rig.travel_mm"],
             Self::Pair { upper, .. } => core::slice::from_ref(&upper.0),
+            Self::Unable { keys, .. } => keys,
             Self::OutOfReach { .. } => &[
                 "rig.arm_length_mm",
                 "rig.arm_pivot_radius_mm",
@@ -155,13 +181,158 @@ pub enum Bound {
     AtMost(f64),
 }
 
+impl core::fmt::Display for Bound {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        // Rounded so that the number itself is within the bound.
+        match *self {
+            Self::AtLeast(least) => write!(f, "at least {:.2}", libm::ceil(least * 100.0) / 100.0),
+            Self::AtMost(most) => write!(f, "at most {:.2}", libm::floor(most * 100.0) / 100.0),
+        }
+    }
+}
+
 impl Rig {
     /// Checks every value against its range and the values against one another.
     pub fn validate(&self) -> Result<(), RigError> {
         self.ranges()?;
         self.step_table()?;
         self.pairs()?;
-        self.reach()
+        self.reach()?;
+        self.abilities()
+    }
+
+    /// Whether sensors, pre-tightener and drive can do what the controller asks of them.
+    fn abilities(&self) -> Result<(), RigError> {
+        let (preload, drive) = (&self.preload, &self.drive);
+        let radius = self.rig.wheel_radius_mm;
+        let turn_mm = 2.0 * core::f64::consts::PI * radius;
+        // A corner pressed by the limit into a relaxed tread: a triangle on each side of it, at the
+        // slope of a wheel that touches it, carries `k L d^2 / tan(phi)`.
+        let below = radius - self.rig.step_height_mm;
+        let slope = libm::sqrt(radius * radius - below * below) / below;
+        let rate = 1e-9 * self.tread.k_inf_pa_per_m * self.rig.wheel_width_mm;
+        let deepest = libm::sqrt(preload.limit_n * slope / rate);
+        let load = self.plant.top_load_n * self.plant.top_load_share;
+        let accelerated = load
+            + 1e-3
+                * (drive.reflected_mass_kg + self.plant.moved_mass_kg)
+                * drive.acceleration_mm_s2;
+        let climbs = load + preload.limit_n * slope;
+        let checks: [(_, _, &[&'static str], _); 10] = [
+            (
+                self.sense.encoder_counts,
+                Bound::AtLeast(turn_mm / LARGEST_COUNT_MM),
+                &["sense.encoder_counts", "rig.wheel_radius_mm"],
+                "a count is too long for the speed of a crossing",
+            ),
+            (
+                self.sense.preload_full_scale_n,
+                Bound::AtLeast(preload.limit_n * (1.0 + OVERPRESSURE_PART) / SHOWN_PART),
+                &["sense.preload_full_scale_n", "preload.limit_n"],
+                "the sensor does not show a preload beyond preload.limit_n",
+            ),
+            (
+                self.sense.tread_full_scale_mm,
+                Bound::AtLeast(deepest / SHOWN_PART),
+                &["sense.tread_full_scale_mm", "preload.limit_n", "tread.k_inf_pa_per_m"],
+                "the sensor does not show how deep preload.limit_n presses a corner into the tread",
+            ),
+            (
+                preload.cruise_n,
+                Bound::AtMost(self.most_preload_n()),
+                &["preload.cruise_n", "preload.limit_n", "sense.preload_error"],
+                "less is free below preload.limit_n for regulation and the sensor's error",
+            ),
+            (
+                preload.slew_n_per_s,
+                Bound::AtMost(preload.cruise_n / self.preload_latency_s()),
+                &["preload.slew_n_per_s", "preload.cruise_n", "preload.delay_s", "preload.lag_s"],
+                "preload.delay_s and preload.lag_s allow more than preload.cruise_n before it answers",
+            ),
+            (
+                preload.spring_n_per_mm,
+                Bound::AtMost(self.regulation_n() / (LIFT_SLOPE * self.rig.step_tolerance_mm)),
+                &["preload.spring_n_per_mm", "preload.limit_n", "rig.step_tolerance_mm"],
+                "a step that is off by rig.step_tolerance_mm changes the preload beyond regulation",
+            ),
+            (
+                preload.spring_n_per_mm,
+                Bound::AtMost(
+                    preload.spring_n_per_mm * self.climb_speed_mm_s()
+                        / self.least_planned_speed_mm_s(),
+                ),
+                &[
+                    "preload.spring_n_per_mm",
+                    "preload.slew_n_per_s",
+                    "preload.delay_s",
+                    "preload.lag_s",
+                    "drive.min_crossing_speed_mm_s",
+                    "preload.limit_n",
+                ],
+                "the pre-tightener does not follow it over a step at drive.min_crossing_speed_mm_s",
+            ),
+            (
+                drive.force_limit_n,
+                Bound::AtLeast(accelerated.max(climbs)),
+                &[
+                    "drive.force_limit_n",
+                    "drive.reflected_mass_kg",
+                    "drive.acceleration_mm_s2",
+                    "plant.top_load_n",
+                    "plant.top_load_share",
+                    "preload.limit_n",
+                ],
+                "the drive does not accelerate as planned, or climb with preload.limit_n",
+            ),
+            (
+                drive.stall_force_n,
+                Bound::AtLeast(
+                    accelerated / (1.0 - drive.cruise_speed_mm_s / drive.no_load_speed_mm_s),
+                ),
+                &[
+                    "drive.stall_force_n",
+                    "drive.no_load_speed_mm_s",
+                    "drive.cruise_speed_mm_s",
+                    "drive.reflected_mass_kg",
+                    "drive.acceleration_mm_s2",
+                ],
+                "the drive does not accelerate as planned up to drive.cruise_speed_mm_s",
+            ),
+            (
+                drive.stall_force_n,
+                Bound::AtLeast(
+                    climbs / (1.0 - self.least_planned_speed_mm_s() / drive.no_load_speed_mm_s),
+                ),
+                &[
+                    "drive.stall_force_n",
+                    "drive.no_load_speed_mm_s",
+                    "drive.min_crossing_speed_mm_s",
+                    "preload.limit_n",
+                    "plant.top_load_n",
+                ],
+                "the drive does not climb with preload.limit_n",
+            ),
+        ];
+        for (value, bound, keys, reason) in checks {
+            let kept = match bound {
+                Bound::AtLeast(least) => value >= least,
+                Bound::AtMost(most) => value <= most,
+            };
+            if !kept {
+                return Err(RigError::Unable { value, bound, reason, keys });
+            }
+        }
+        Ok(())
+    }
+
+    /// Preload kept free below the limit for regulation, N.
+    fn regulation_n(&self) -> f64 {
+        REGULATION_PART * self.preload.limit_n
+    }
+
+    /// Largest preload to ask for, N: with regulation and the sensor's error, within the limit.
+    pub fn most_preload_n(&self) -> f64 {
+        self.preload.limit_n * (1.0 - self.sense.preload_error) - self.regulation_n()
     }
 
     /// Values that bound one another.
@@ -170,14 +341,9 @@ impl Rig {
         let safe = ("control.safe_speed_mm_s", self.control.safe_speed_mm_s);
         let least = ("drive.min_crossing_speed_mm_s", self.drive.min_crossing_speed_mm_s);
         let top = ("drive.no_load_speed_mm_s", self.drive.no_load_speed_mm_s);
-        let limit = ("preload.limit_n", self.preload.limit_n);
-        let pressed = ("preload.cruise_n", self.preload.cruise_n);
-        for (upper, lower, ratio) in [
-            (safe, least, 1.0),
-            (cruise, safe, 1.0),
-            (top, cruise, TOP_SPEED_RESERVE),
-            (limit, pressed, 1.0 / (1.0 - REGULATION_PART)),
-        ] {
+        for (upper, lower, ratio) in
+            [(safe, least, 1.0), (cruise, safe, 1.0), (top, cruise, TOP_SPEED_RESERVE)]
+        {
             if upper.1 < lower.1 * ratio {
                 return Err(RigError::Pair { upper, lower, ratio });
             }
@@ -212,7 +378,7 @@ impl Rig {
     /// Speed at which the pre-tightener just follows the spring at lift-off, mm/s: by its slew, and
     /// with what the spring does in its dead time and lag within the part of regulation.
     pub fn climb_speed_mm_s(&self) -> f64 {
-        let late = REGULATION_PART * self.preload.limit_n / self.preload_latency_s();
+        let late = self.regulation_n() / self.preload_latency_s();
         late.min(CLIMB_PART * self.preload.slew_n_per_s)
             / (LIFT_SLOPE * self.preload.spring_n_per_mm)
     }
@@ -223,7 +389,7 @@ impl Rig {
     }
 
     /// Keys with their value and its least and largest value.
-    pub const fn bounds(&self) -> [(&'static str, f64, f64, f64); 45] {
+    pub const fn bounds(&self) -> [(&'static str, f64, f64, f64); 46] {
         [
             ("rig.wheel_radius_mm", self.rig.wheel_radius_mm, 10.0, 150.0),
             ("rig.wheel_wear_mm", self.rig.wheel_wear_mm, 0.0, 0.2),
@@ -262,6 +428,7 @@ impl Rig {
             ("sense.encoder_counts", self.sense.encoder_counts, 1024.0, 65_536.0),
             ("sense.preload_full_scale_n", self.sense.preload_full_scale_n, 20.0, 2000.0),
             ("sense.tread_full_scale_mm", self.sense.tread_full_scale_mm, 0.5, 50.0),
+            ("sense.preload_error", self.sense.preload_error, 0.0, 0.3),
             ("sense.angle_zero_code", self.sense.angle_zero_code, 0.0, 16_383.0),
             ("sense.stale_after_s", self.sense.stale_after_s, 0.005, 1.0),
             ("control.gap_ref_mm", self.control.gap_ref_mm, 0.0, 10.0),

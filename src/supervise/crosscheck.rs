@@ -21,12 +21,14 @@ const KEPT: usize = 16;
 /// `1 / (6 ms)^2`, 530 mm/s^2 beyond the reference: twice the acceleration of the profile. The
 /// worst of the random rigs is 2.1.
 const BENT_COUNTS: f64 = 2.5;
-/// Distance off the reference within two spans, mm: the dips behind a step make 0.11.
-const OFF: Millimetres = q16(150_000);
-/// Distance that counts as progress of the wheel, mm: two counts and a half.
-const PROGRESS: Millimetres = q16(50_000);
-/// Travel of the reference that a wheel which has turned may stay behind, mm.
-const LAG: Millimetres = q16(400_000);
+/// Distance off the reference within two spans, mm: the dips behind a step make 0.11, and two
+/// readings of a counter are off by a count.
+const OFF_MM: f64 = 0.11;
+const OFF_COUNTS: f64 = 2.0;
+/// Distance that counts as progress of the wheel, counts.
+const PROGRESS_COUNTS: f64 = 2.5;
+/// Travel of the reference that a wheel which has turned may stay behind, mm, beside its progress.
+const LAG_MM: f64 = 0.35;
 /// The same before it has turned, mm: on a corner the speed loop first has to find the duty that
 /// lifts it, 0.2 s at half the crossing speed.
 const START_LAG: Millimetres = q16(2_000_000);
@@ -72,8 +74,11 @@ const ERRATIC: u8 = 60;
 
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(super) struct CrossCheck {
-    /// See [`BENT_COUNTS`], mm.
+    /// See [`BENT_COUNTS`], [`OFF_MM`], [`PROGRESS_COUNTS`], [`LAG_MM`], mm.
     bent: Millimetres,
+    off: Millimetres,
+    progress: Millimetres,
+    lag: Millimetres,
     /// See [`STRAYED_PART`], N.
     strayed: Newtons,
 }
@@ -197,10 +202,14 @@ impl CrossCheck {
     pub(super) fn try_build(rig: &Rig) -> Result<Self, RigError> {
         let turn_mm = 2.0 * core::f64::consts::PI * rig.rig.wheel_radius_mm;
         let count_mm = turn_mm / rig.sense.encoder_counts;
+        let counts = |mm: f64| checked("sense.encoder_counts", mm);
         let late = STRAYED_LATENCIES * rig.preload.slew_n_per_s * rig.preload_latency_s();
         let strayed = late.max(STRAYED_PART * rig.preload.cruise_n);
         Ok(Self {
-            bent: checked("sense.encoder_counts", BENT_COUNTS * count_mm)?,
+            bent: counts(BENT_COUNTS * count_mm)?,
+            off: counts(OFF_MM + OFF_COUNTS * count_mm)?,
+            progress: counts(PROGRESS_COUNTS * count_mm)?,
+            lag: counts(LAG_MM + PROGRESS_COUNTS * count_mm)?,
             strayed: checked("preload.slew_n_per_s", strayed)?,
         })
     }
@@ -244,7 +253,7 @@ impl CrossCheck {
         let bent = self.bends(state, seen);
         // Without a new reading the wheel's position is unknown.
         let fresh = seen.read_at == seen.now;
-        let lags = fresh && lags(state, seen);
+        let lags = fresh && self.lags(state, seen);
         let preload = self.preload(state, noise, seen);
         let stuck = noise.compression.stuck;
         let limits = Limits { stuck, jump: JUMP_MM, due: self.telling() };
@@ -293,21 +302,21 @@ impl CrossCheck {
             state.held = if missed { 0 } else { state.held + 1 };
             return false;
         }
-        ((now - middle) - (middle - old)).abs() > self.bent || (now - old).abs() > OFF
+        ((now - middle) - (middle - old)).abs() > self.bent || (now - old).abs() > self.off
     }
-}
 
-/// Whether the reference goes on while the wheel does not.
-fn lags(state: &mut CrossState, seen: &Compared) -> bool {
-    let (travel, reference) = state.progress;
-    let moved = Q16::narrow(seen.travel.saturating_sub(travel));
-    if moved.abs() > PROGRESS {
-        state.progress = (seen.travel, state.reference);
-        state.turned = state.turned.saturating_add(1).min(TURNED);
-        return false;
+    /// Whether the reference goes on while the wheel does not.
+    fn lags(&self, state: &mut CrossState, seen: &Compared) -> bool {
+        let (travel, reference) = state.progress;
+        let moved = Q16::narrow(seen.travel.saturating_sub(travel));
+        if moved.abs() > self.progress {
+            state.progress = (seen.travel, state.reference);
+            state.turned = state.turned.saturating_add(1).min(TURNED);
+            return false;
+        }
+        let most = if state.turned < TURNED { START_LAG } else { self.lag };
+        Q16::narrow(state.reference.saturating_sub(reference)).abs() > most
     }
-    let most = if state.turned < TURNED { START_LAG } else { LAG };
-    Q16::narrow(state.reference.saturating_sub(reference)).abs() > most
 }
 
 /// Whether the arm has moved farther than the wheel.

@@ -8,14 +8,13 @@ use super::readback::{Readback, ReadbackState};
 use crate::control::preload_loop::answer_s;
 use crate::fault::Fault;
 use crate::numeric::{LowPass, LowPassState, checked};
-use crate::rig::{Rig, RigError};
+use crate::rig::{OVERPRESSURE_PART, Rig, RigError};
 use crate::sense::raw::BridgeCodes;
 use crate::sense::{Reason, SensedState, Validity};
-use crate::units::{Duty, Millimetres, MillimetresPerSecond, Newtons, Q16, Ratio, TICK_HZ, Tick, q16};
+use crate::units::{
+    Duty, Millimetres, MillimetresPerSecond, Newtons, Q16, Ratio, TICK_HZ, Tick, q16,
+};
 
-/// Preload above the limit that counts as overpressure, relative: regulation and the spring that
-/// a climb compresses stay below it.
-const OVERPRESSURE_PART: f64 = 0.10;
 /// Ticks that overpressure must last, longer than noise.
 const OVERPRESSURE_TICKS: u16 = 10;
 /// Speed of a wheel whose bridge is off, mm/s: the observer's ringing is less.

@@ -5,10 +5,10 @@ use crate::model::dip::Dip;
 use crate::model::formula::Formula;
 use crate::model::guard::Guard;
 use crate::model::plan::Strategy;
-use crate::model::reduced::ReducedModel;
+use crate::model::reduced::{ReducedModel, Scale};
 use crate::model::timing::Timing;
 use crate::numeric::checked;
-use crate::rig::{REGULATION_PART, Rig, RigError};
+use crate::rig::{Rig, RigError};
 use crate::units::{Direction, Millimetres};
 
 /// Rise and dip of the wheel at which a corner shows its place, mm.
@@ -55,6 +55,8 @@ impl Planner {
         let gap = |value: f64| checked("control.gap_ref_mm", value);
         let reserve = rig.control.gap_reserve;
         let range = rig.control.adaptation_range;
+        // As far as the model goes.
+        let scale = |to| Ok(Scale::new(checked("control.adaptation_range", to)?).ratio());
         Ok(Self {
             model,
             guard: Guard::try_build(rig)?,
@@ -70,15 +72,9 @@ impl Planner {
                 if reserve > LEAST_RESERVE { 1.0 / reserve } else { 0.0 },
             )?,
             cruise_speed: checked("drive.cruise_speed_mm_s", rig.drive.cruise_speed_mm_s)?,
-            least_speed: checked(
-                "drive.min_crossing_speed_mm_s",
-                rig.least_planned_speed_mm_s(),
-            )?,
+            least_speed: checked("drive.min_crossing_speed_mm_s", rig.least_planned_speed_mm_s())?,
             safe_speed: checked("control.safe_speed_mm_s", rig.control.safe_speed_mm_s)?,
-            climb_speed: checked(
-                "preload.spring_n_per_mm",
-                rig.climb_speed_mm_s().min(1000.0),
-            )?,
+            climb_speed: checked("preload.spring_n_per_mm", rig.climb_speed_mm_s().min(1000.0))?,
             prescribed_speed: None,
             uniform: false,
             radius: checked("rig.wheel_radius_mm", rig.rig.wheel_radius_mm)?,
@@ -86,16 +82,10 @@ impl Planner {
             tolerance: checked("rig.step_tolerance_mm", rig.rig.step_tolerance_mm)?,
             cruise_preload: checked("preload.cruise_n", rig.preload.cruise_n)?,
             rolling_preload: checked("control.slip_margin", rig.rolling_preload_n())?,
-            most_preload: checked(
-                "preload.limit_n",
-                rig.preload.limit_n * (1.0 - REGULATION_PART),
-            )?,
+            most_preload: checked("preload.limit_n", rig.most_preload_n())?,
             friction: checked("plant.mu", rig.plant.mu)?,
             usable: checked("control.slip_margin", rig.plant.mu - rig.control.slip_margin)?,
-            scale_range: (
-                checked("control.adaptation_range", 1.0 - range)?,
-                checked("control.adaptation_range", 1.0 + STIFFER_RANGE * range)?,
-            ),
+            scale_range: (scale(1.0 - range)?, scale(1.0 + STIFFER_RANGE * range)?),
             gain: checked("control.adaptation_gain", rig.control.adaptation_gain)?,
         })
     }
@@ -162,7 +152,7 @@ mod tests {
             for preload in [plan.cross_preload, plan.cruise_preload] {
                 let preload = preload.to_num::<f64>();
                 prop_assert!(preload >= rig.preload.cruise_n - 1e-3);
-                prop_assert!(preload <= rig.preload.limit_n * (1.0 - REGULATION_PART) + 1e-3);
+                prop_assert!(preload <= rig.most_preload_n() + 1e-3);
             }
             prop_assert!(plan.brake_distance >= Q16::ZERO && plan.brake_time >= Q16::ZERO);
         }
@@ -232,7 +222,7 @@ mod tests {
             for step in 0..4 {
                 let preload = planner.plan(&request(false, step, 1.0)).cruise_preload;
                 let expected = match strategy {
-                    Strategy::Limit => rig.preload.limit_n * (1.0 - REGULATION_PART),
+                    Strategy::Limit => rig.most_preload_n(),
                     _ => rig.preload.cruise_n,
                 };
                 assert!((preload.to_num::<f64>() - expected).abs() < 1e-3, "{strategy:?}");
