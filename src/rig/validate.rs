@@ -8,6 +8,8 @@ use crate::sense::analog::{BROKEN_ABOVE, FULL_AT, ZERO_AT};
 /// rig within its tolerances exceeds the limit with it.
 const REGULATION_PART: f64 = 0.03;
 
+/// Part of the cruise preload by which a preload is short.
+pub(crate) const SHORT_PART: f64 = 0.1;
 /// Part of the pre-tightener's slew that the spring may take while the wheel climbs.
 pub(crate) const CLIMB_PART: f64 = 0.9;
 /// Preload above the limit that counts as overpressure, relative: regulation and the spring that
@@ -376,9 +378,9 @@ impl Rig {
     }
 
     /// Speed at which the pre-tightener just follows the spring at lift-off, mm/s: by its slew, and
-    /// with what the spring does in its dead time and lag within the part of regulation.
+    /// so that the preload is not short by what the spring does within its dead time and lag.
     pub fn climb_speed_mm_s(&self) -> f64 {
-        let late = self.regulation_n() / self.preload_latency_s();
+        let late = SHORT_PART * self.preload.cruise_n / self.preload_latency_s();
         late.min(CLIMB_PART * self.preload.slew_n_per_s)
             / (LIFT_SLOPE * self.preload.spring_n_per_mm)
     }

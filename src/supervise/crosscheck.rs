@@ -7,7 +7,7 @@
 
 use crate::fault::Fault;
 use crate::numeric::checked;
-use crate::rig::{Rig, RigError};
+use crate::rig::{Rig, RigError, SHORT_PART};
 use crate::units::{
     Millimetres, MillimetresPerSecond, Newtons, Q16, Ratio, Tick, Travel, per_tick, q16,
 };
@@ -48,11 +48,12 @@ const EFFORT: (Ratio, Ratio) = (q16(-50_000), q16(130_000));
 /// Ticks for which it must be outside: more than two time constants of the loop, in which it
 /// settles after a corner.
 const EFFORT_TICKS: u8 = 120;
-/// Deviation of the preload from its model, part of the cruise preload: 0.18 at the ramps of an
-/// actuator whose dead time, lag and slew are all off. At least what the slew makes in 1.25 times
-/// dead time and lag: half of it with these off by half, and the spring's and the sensor's part.
-const STRAYED_PART: f64 = 0.25;
-const STRAYED_LATENCIES: f64 = 1.25;
+/// Dead times and lags of its slew by which a preload may be short: what it makes with these off by
+/// half. At least a part of the cruise preload.
+const SHORT_LATENCIES: f64 = 0.5;
+/// Deviation of the preload from its model that is a fault, over what is short: 1.8 at the ramps of
+/// an actuator whose dead time, lag and slew are all off.
+const STRAYED: f64 = 2.5;
 /// Ticks for which it must deviate.
 const STRAYED_TICKS: u8 = 10;
 /// Equal codes in a row that count as stuck if the preload has to change meanwhile, or if nothing
@@ -79,7 +80,8 @@ pub(super) struct CrossCheck {
     off: Millimetres,
     progress: Millimetres,
     lag: Millimetres,
-    /// See [`STRAYED_PART`], N.
+    /// See [`SHORT_LATENCIES`] and [`STRAYED`], N.
+    short: Newtons,
     strayed: Newtons,
 }
 
@@ -203,14 +205,15 @@ impl CrossCheck {
         let turn_mm = 2.0 * core::f64::consts::PI * rig.rig.wheel_radius_mm;
         let count_mm = turn_mm / rig.sense.encoder_counts;
         let counts = |mm: f64| checked("sense.encoder_counts", mm);
-        let late = STRAYED_LATENCIES * rig.preload.slew_n_per_s * rig.preload_latency_s();
-        let strayed = late.max(STRAYED_PART * rig.preload.cruise_n);
+        let late = SHORT_LATENCIES * rig.preload.slew_n_per_s * rig.preload_latency_s();
+        let short = late.max(SHORT_PART * rig.preload.cruise_n);
         Ok(Self {
             bent: counts(BENT_COUNTS * count_mm)?,
             off: counts(OFF_MM + OFF_COUNTS * count_mm)?,
             progress: counts(PROGRESS_COUNTS * count_mm)?,
             lag: counts(LAG_MM + PROGRESS_COUNTS * count_mm)?,
-            strayed: checked("preload.slew_n_per_s", strayed)?,
+            short: checked("preload.slew_n_per_s", short)?,
+            strayed: checked("preload.slew_n_per_s", STRAYED * short)?,
         })
     }
 
@@ -233,9 +236,9 @@ impl CrossCheck {
         }
     }
 
-    /// Deviation of the preload from its model that is a fault, N.
-    pub(super) const fn strayed(&self) -> Newtons {
-        self.strayed
+    /// Deviation by which a preload is short, N.
+    pub(super) const fn short(&self) -> Newtons {
+        self.short
     }
 
     /// Change of the preload that no sensor sleeps through, N: half of what counts as astray.

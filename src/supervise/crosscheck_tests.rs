@@ -349,8 +349,9 @@ fn off_by_exactly_the_threshold_is_tolerated() {
         };
         check.bends(&mut state, &off_by(1, distance))
     };
-    assert!(!drifts(OFF) && !drifts(-OFF));
-    assert!(drifts(OFF + Q16::DELTA) && drifts(-OFF - Q16::DELTA));
+    let off = check.off;
+    assert!(!drifts(off) && !drifts(-off));
+    assert!(drifts(off + Q16::DELTA) && drifts(-off - Q16::DELTA));
     let strays = |off: Newtons| {
         let mut state = CrossState::default();
         let at = off_by(1, Q16::ZERO);

@@ -23,8 +23,6 @@ const BEYOND: MillimetresPerSecond = q16(5_000_000);
 const RUNAWAY_TICKS: u16 = 12;
 /// Ticks for which a wheel turns on, by its observer, after a drive of the service mode.
 const COAST_TICKS: u16 = 150;
-/// Part of its bound of an astray preload by which one is short.
-const SHORT_PART: Ratio = q16(400_000);
 
 /// Bounds of a rig.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -92,7 +90,7 @@ impl Monitor {
                 "preload.limit_n",
                 rig.preload.limit_n * (1.0 + OVERPRESSURE_PART),
             )?,
-            short: cross.strayed() * SHORT_PART,
+            short: cross.short(),
             short_ticks: (answer_s(rig) * f64::from(TICK_HZ)) as u16,
             spring: checked("preload.spring_n_per_mm", rig.preload.spring_n_per_mm)?,
             answers: LowPass::build(answer_s(rig)),
