@@ -12,7 +12,7 @@
 #![deny(clippy::float_arithmetic)]
 
 use crate::model::corner_profile::CornerProfile;
-use crate::numeric::{LowPass, LowPassState, checked, divide};
+use crate::numeric::{LowPass, LowPassState, checked, divide, sqrt};
 use crate::rig::{Rig, RigError};
 use crate::units::{Direction, Millimetres, Newtons, Q16, Ratio, Travel, q16};
 
@@ -58,6 +58,8 @@ const LONGEST: u16 = 4096;
 pub struct Tread {
     /// Relaxed stiffness of an element, N/mm.
     rate: Q16,
+    /// Load over the compression to the power 1.5, relaxed, N/mm^1.5.
+    relaxed: Q16,
     /// `s - 1`.
     excess: Ratio,
     memory: LowPass,
@@ -152,6 +154,10 @@ impl Tread {
         let length = |mm| checked("rig.wheel_radius_mm", mm);
         Ok(Self {
             rate: checked("tread.k_inf_pa_per_m", rate)?,
+            relaxed: checked(
+                "tread.k_inf_pa_per_m",
+                (4.0 / 3.0 * rate / spacing * libm::sqrt(2.0 * radius)).min(f64::from(i16::MAX)),
+            )?,
             excess: checked("tread.stiffening", rig.tread.stiffening - 1.0)?,
             memory: LowPass::build(rig.tread.tau_s),
             spacing: length(spacing)?,
@@ -159,6 +165,12 @@ impl Tread {
             rolling: (length(from)?, length(to)?),
             least: checked("preload.cruise_n", LEAST_PART * rig.preload.cruise_n)?,
         })
+    }
+
+    /// Load on a relaxed tread that is compressed by so much, N: `4/3 k_inf L c sqrt(2 R c)`.
+    pub fn means(&self, compression: Millimetres) -> Newtons {
+        let depth = compression.max(Q16::ZERO);
+        sqrt(depth) * depth * self.relaxed
     }
 
     /// The wheel is at rest here and has been pressed like this for long.

@@ -58,6 +58,9 @@ impl Controller {
         if let Some(outcome) = plan.outcome.as_ref() {
             planning.scale = outcome.scale;
             planning.reserve = outcome.reserve;
+            // What a crossing has shown counts for more than what the tread showed before.
+            let trusted = planning.review.is_some_and(|review| review.trusted);
+            planning.unknown &= !trusted || outcome.strange || outcome.wide;
             if outcome.bounded {
                 tick.log(Event::Limit(Limit::AdaptationBounded));
             }
