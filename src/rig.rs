@@ -9,7 +9,7 @@ mod presets;
 mod validate;
 
 pub use validate::{Bound, RigError};
-pub(crate) use validate::{CLIMB_PART, OVERPRESSURE_PART, SHORT_PART};
+pub(crate) use validate::{CLIMB_PART, OVERPRESSURE_PART, SHORT_PART, START_LAG_MM};
 
 /// Most steps a step table may hold.
 pub const MAX_STEPS: usize = 8;

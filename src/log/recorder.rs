@@ -61,7 +61,7 @@ mod tests {
             recorder.snapshot(&row, PositionConfidence::Sure, MissedCheckIns::TICK, zeros);
         assert_eq!((snapshot.mode(), snapshot.fault), (Some(row.mode), 0));
         assert_eq!((snapshot.tick, snapshot.level, snapshot.position), (5, 2, row.position));
-        assert_eq!(snapshot.missed, MissedCheckIns::TICK, zeros);
+        assert_eq!(snapshot.missed, MissedCheckIns::TICK);
         assert!(snapshot.packed_speed.placed());
         assert_eq!(snapshot.packed_zeros.zeros(), zeros);
         let unsure =

@@ -1,6 +1,7 @@
 //! Checks of a rig's parameters.
 
 use super::Rig;
+use crate::control::speed_loop::{CROSSOVER_RAD_S, MOST_ERROR_MM_S, PROPORTIONAL};
 use crate::sense::analog::{BROKEN_ABOVE, FULL_AT, ZERO_AT};
 
 /// Preload kept free below the limit for regulation, relative to the limit, beside the error of the
@@ -33,6 +34,10 @@ const LEAST_GRIP: f64 = 1e-3;
 /// Largest travel of an encoder count, mm: at the least speed of a crossing, 1.5 mm/s, the speed
 /// observer then has three counts within its settling time.
 const LARGEST_COUNT_MM: f64 = 0.08;
+
+/// Travel of the reference that a wheel which has not turned may stay behind, mm: on a corner the
+/// integral part of the speed loop first has to find the duty that lifts it.
+pub(crate) const START_LAG_MM: f64 = 2.0;
 
 /// Least speed of the unloaded motor over the cruise speed, for regulation.
 const TOP_SPEED_RESERVE: f64 = 1.2;
@@ -220,6 +225,9 @@ impl Rig {
                 * (drive.reflected_mass_kg + self.plant.moved_mass_kg)
                 * drive.acceleration_mm_s2;
         let climbs = load + preload.limit_n * slope;
+        // What the proportional part adds, whatever the load.
+        let corrected =
+            drive.stall_force_n * PROPORTIONAL * MOST_ERROR_MM_S / drive.no_load_speed_mm_s;
         let checks: [(_, _, &[&'static str], _); 10] = [
             (
                 self.sense.encoder_counts,
@@ -275,7 +283,7 @@ impl Rig {
             ),
             (
                 drive.force_limit_n,
-                Bound::AtLeast(accelerated.max(climbs)),
+                Bound::AtLeast(accelerated.max(climbs) + corrected),
                 &[
                     "drive.force_limit_n",
                     "drive.reflected_mass_kg",
@@ -303,16 +311,16 @@ impl Rig {
             (
                 drive.stall_force_n,
                 Bound::AtLeast(
-                    climbs / (1.0 - self.least_planned_speed_mm_s() / drive.no_load_speed_mm_s),
+                    climbs * drive.no_load_speed_mm_s / (CROSSOVER_RAD_S * START_LAG_MM),
                 ),
                 &[
                     "drive.stall_force_n",
                     "drive.no_load_speed_mm_s",
-                    "drive.min_crossing_speed_mm_s",
                     "preload.limit_n",
                     "plant.top_load_n",
+                    "plant.top_load_share",
                 ],
-                "the drive does not climb with preload.limit_n",
+                "the wheel stands on a corner for too long until the speed loop lifts it",
             ),
         ];
         for (value, bound, keys, reason) in checks {
@@ -397,7 +405,7 @@ impl Rig {
             ("rig.wheel_wear_mm", self.rig.wheel_wear_mm, 0.0, 0.2),
             ("rig.wheel_width_mm", self.rig.wheel_width_mm, 1.0, 200.0),
             ("rig.step_height_mm", self.rig.step_height_mm, 1.5, 8.0),
-            ("rig.step_tolerance_mm", self.rig.step_tolerance_mm, 0.05, 5.0),
+            ("rig.step_tolerance_mm", self.rig.step_tolerance_mm, 0.1, 5.0),
             ("rig.travel_mm", self.rig.travel_mm, 1.0, 2000.0),
             ("rig.wall_radius_mm", self.rig.wall_radius_mm, 50.0, 1000.0),
             ("rig.arm_length_mm", self.rig.arm_length_mm, 20.0, 1000.0),
@@ -419,7 +427,7 @@ impl Rig {
             ("preload.lag_s", self.preload.lag_s, 0.005, 1.0),
             ("drive.no_load_speed_mm_s", self.drive.no_load_speed_mm_s, 5.0, 300.0),
             ("drive.stall_force_n", self.drive.stall_force_n, 5.0, 5000.0),
-            ("drive.force_limit_n", self.drive.force_limit_n, 5.0, 5000.0),
+            ("drive.force_limit_n", self.drive.force_limit_n, 5.0, 1000.0),
             ("drive.reflected_mass_kg", self.drive.reflected_mass_kg, 0.1, 1000.0),
             ("drive.cruise_speed_mm_s", self.drive.cruise_speed_mm_s, 3.0, 100.0),
             ("drive.min_crossing_speed_mm_s", self.drive.min_crossing_speed_mm_s, 0.5, 20.0),

@@ -7,7 +7,7 @@
 
 use crate::fault::Fault;
 use crate::numeric::checked;
-use crate::rig::{Rig, RigError, SHORT_PART};
+use crate::rig::{Rig, RigError, SHORT_PART, START_LAG_MM};
 use crate::units::{
     Millimetres, MillimetresPerSecond, Newtons, Q16, Ratio, Tick, Travel, per_tick, q16,
 };
@@ -29,9 +29,6 @@ const OFF_COUNTS: f64 = 2.0;
 const PROGRESS_COUNTS: f64 = 2.5;
 /// Travel of the reference that a wheel which has turned may stay behind, mm, beside its progress.
 const LAG_MM: f64 = 0.35;
-/// The same before it has turned, mm: on a corner the speed loop first has to find the duty that
-/// lifts it, 0.2 s at half the crossing speed.
-const START_LAG: Millimetres = q16(2_000_000);
 /// Number of progresses after which the wheel counts as turned.
 const TURNED: u8 = 10;
 /// Ticks within which arm and wheel are compared.
@@ -80,6 +77,8 @@ pub(super) struct CrossCheck {
     off: Millimetres,
     progress: Millimetres,
     lag: Millimetres,
+    /// See [`START_LAG_MM`], mm.
+    start_lag: Millimetres,
     /// See [`SHORT_LATENCIES`] and [`STRAYED`], N.
     short: Newtons,
     strayed: Newtons,
@@ -211,6 +210,7 @@ impl CrossCheck {
             bent: counts(BENT_COUNTS * count_mm)?,
             off: counts(OFF_MM + OFF_COUNTS * count_mm)?,
             progress: counts(PROGRESS_COUNTS * count_mm)?,
+            start_lag: counts(START_LAG_MM)?,
             lag: counts(LAG_MM + PROGRESS_COUNTS * count_mm)?,
             short: checked("preload.slew_n_per_s", short)?,
             strayed: checked("preload.slew_n_per_s", STRAYED * short)?,
@@ -317,7 +317,7 @@ impl CrossCheck {
             state.turned = state.turned.saturating_add(1).min(TURNED);
             return false;
         }
-        let most = if state.turned < TURNED { START_LAG } else { self.lag };
+        let most = if state.turned < TURNED { self.start_lag } else { self.lag };
         Q16::narrow(state.reference.saturating_sub(reference)).abs() > most
     }
 }
