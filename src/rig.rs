@@ -5,11 +5,12 @@
 //! Sources: *published* is the study of the deployable mechanism; *derived* is computed from
 //! published numbers; *chosen* is ours, with the reason beside it.
 
+mod abilities;
 mod presets;
 mod validate;
 
+pub(crate) use abilities::{CLIMB_PART, OVERPRESSURE_PART, SHORT_PART, START_LAG_MM};
 pub use validate::{Bound, RigError};
-pub(crate) use validate::{CLIMB_PART, OVERPRESSURE_PART, SHORT_PART, START_LAG_MM};
 
 /// Most steps a step table may hold.
 pub const MAX_STEPS: usize = 8;
