@@ -195,3 +195,53 @@ impl Rig {
         self.drive.min_crossing_speed_mm_s * (1.0 + DIP_PART)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_presets_plan_with_the_preload_that_they_had() {
+        for (name, most_n) in [("prototype", 47.75), ("fe", 143.25)] {
+            let rig = Rig::named(name).expect("a preset");
+            assert_eq!(rig.validate(), Ok(()));
+            assert!((rig.most_preload_n() - most_n).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn what_cannot_work_is_refused_with_key_value_bound_and_reason() {
+        let cases: [(fn(&mut Rig), &str); 6] = [
+            (
+                |rig| rig.sense.encoder_counts = 1024.0,
+                "sense.encoder_counts = 1024: expected at least 1963.5",
+            ),
+            (
+                |rig| rig.preload.spring_n_per_mm = 4.0,
+                "preload.spring_n_per_mm = 4: expected at most 3.75",
+            ),
+            (
+                |rig| rig.preload.slew_n_per_s = 500.0,
+                "preload.slew_n_per_s = 500: expected at most 237.8",
+            ),
+            (
+                |rig| rig.sense.preload_full_scale_n = 50.0,
+                "sense.preload_full_scale_n = 50: expected at least 50.2",
+            ),
+            (
+                |rig| rig.drive.stall_force_n = 40.0,
+                "drive.stall_force_n = 40: expected at least 58",
+            ),
+            (
+                |rig| rig.drive.force_limit_n = 38.0,
+                "drive.force_limit_n = 38: expected at least 42",
+            ),
+        ];
+        for (change, expected) in cases {
+            let mut rig = Rig::prototype();
+            change(&mut rig);
+            let text = rig.validate().expect_err("refused").to_string();
+            assert!(text.starts_with(expected), "{text}");
+        }
+    }
+}

@@ -338,6 +338,33 @@ mod tests {
     }
 
     #[test]
+    fn what_the_wheel_moves_the_spring_by_is_excused_until_the_loop_has_answered() {
+        let monitor = Monitor::try_build(&Rig::prototype()).unwrap();
+        // Down a step of 4 mm the spring of 1.2 N/mm yields by 4.8 N.
+        let off = |radius: f64, ticks: usize| {
+            let mut state = MonitorState::default();
+            let mut sensed = sensed(8.0, 36.0);
+            let of = |sensed: &SensedState, state: &mut MonitorState| {
+                let due = q16(40_000_000);
+                let seen = Observed { preload_due: due, ..observed(RUN, sensed) };
+                monitor.off(state, &seen, true).to_num::<f64>()
+            };
+            of(&sensed, &mut state);
+            sensed.radius.value += Q16::from_num(radius);
+            (0..ticks).map(|_| of(&sensed, &mut state)).last()
+        };
+        let near = |radius, ticks, expected: f64| {
+            let off = off(radius, ticks).unwrap();
+            assert!((off - expected).abs() < 0.05, "{radius} {ticks}: {off}");
+        };
+        near(0.0, 1, -4.0);
+        near(4.0, 1, 0.0);
+        // Up a step it rises: that excuses no preload that is short.
+        near(-4.0, 1, -4.0);
+        near(4.0, 3000, -4.0);
+    }
+
+    #[test]
     fn each_condition_is_found_in_its_time() {
         let press = usize::from(OVERPRESSURE_TICKS);
         assert_eq!(found(RUN, 8.0, 8.0, 56.0, 48.0), Some((Fault::Overpressure, press)));

@@ -194,6 +194,14 @@ mod tests {
     use crate::units::q16;
 
     #[test]
+    fn a_start_has_the_zeros_of_its_record() {
+        let zeros = Zeros { preload: q16(3_000_000), compression: q16(100_000) };
+        let place = Place { position: q16(30_000_000), sure: true, zeros };
+        assert_eq!(State::restored(Some(place)).zeros(), zeros);
+        assert_eq!(State::restored(None).zeros(), Zeros::default());
+    }
+
+    #[test]
     fn a_corner_is_blended_in_over_its_ticks_or_at_once() {
         let mut state = State::default();
         state.estimate.watch.contact = Contact::Both;

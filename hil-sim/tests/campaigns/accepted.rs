@@ -126,3 +126,26 @@ fn a_rig_around_a_preset_runs_or_is_refused() {
     let accepted = outcomes.iter().filter(|(accepted, _)| *accepted).count();
     assert!(2 * accepted > outcomes.len(), "{accepted} of {}", outcomes.len());
 }
+
+#[test]
+fn a_first_step_at_its_least_place_is_crossed_like_another() {
+    for first in [15.2, 16.0] {
+        let sets = [format!("rig.step_positions_mm=[{first}, 40, 62]")];
+        let case = Scenario::default().with(&sets).expect("accepted");
+        let summary = run(&case, Options::default()).expect("runs").summary;
+        assert!(summary.completed && summary.limits.is_empty(), "{first}: {:?}", summary.limits);
+    }
+}
+
+#[test]
+fn with_a_sensor_within_its_error_the_true_preload_keeps_its_limit() {
+    // Gains up to 10 % off.
+    let sets = ["sense.preload_error=0.1", "spread.preload_sensor_gain_rel=0.0333"];
+    for seed in 1..=8 {
+        let mut case = Scenario::default().with(&sets.map(str::to_owned)).expect("accepted");
+        case.run.seed = seed;
+        let recording = run(&case, Options::default()).expect("runs");
+        let most = recording.rows.iter().map(|row| row.truth.preload_true_n).fold(0.0, f64::max);
+        assert!(recording.summary.completed && most <= case.rig.preload.limit_n, "{seed}: {most}");
+    }
+}
