@@ -211,7 +211,8 @@ mod tests {
 
     #[test]
     fn what_cannot_work_is_refused_with_key_value_bound_and_reason() {
-        let cases: [(fn(&mut Rig), &str); 6] = [
+        type Case = (fn(&mut Rig), &'static str);
+        let cases: [Case; 6] = [
             (
                 |rig| rig.sense.encoder_counts = 1024.0,
                 "sense.encoder_counts = 1024: expected at least 1963.5",
