@@ -13,10 +13,10 @@ mod snapshot;
 
 pub use crash::{Crash, Stopped};
 pub use report::{Reset, Restart};
-pub use snapshot::{DriveSnapshot, MissedCheckIns, PackedSpeed, later};
+pub use snapshot::{DriveSnapshot, MissedCheckIns, PackedSpeed, PackedZeros, later};
 
 /// Words of a [`DriveSnapshot`].
-pub const SNAPSHOT_WORDS: usize = 5;
+pub const SNAPSHOT_WORDS: usize = 6;
 
 /// Words of a [`Crash`].
 pub const CRASH_WORDS: usize = 7;

@@ -5,10 +5,11 @@
 //! Sources: *published* is the study of the deployable mechanism; *derived* is computed from
 //! published numbers; *chosen* is ours, with the reason beside it.
 
+mod abilities;
 mod presets;
 mod validate;
 
-pub(crate) use validate::REGULATION_PART;
+pub(crate) use abilities::{CLIMB_PART, OVERPRESSURE_PART, SHORT_PART, START_LAG_MM};
 pub use validate::{Bound, RigError};
 
 /// Most steps a step table may hold.
@@ -174,6 +175,9 @@ pub struct Sensors {
     pub encoder_counts: f64,
     /// Preload sensor full scale, N, at 90 % of the converter; zero is at 5 %.
     pub preload_full_scale_n: f64,
+    /// Largest gain error of the preload sensor, relative: the preload limit is kept with it.
+    /// Derived: three deviations of a calibration within 0.5 %.
+    pub preload_error: f64,
     /// Tread compression full scale, mm, at 90 % of the converter; zero at 5 %.
     pub tread_full_scale_mm: f64,
     /// Code of the angle sensor at which the arm lies along the pillar, 0 to 16383.

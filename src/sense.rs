@@ -30,4 +30,4 @@ mod senses;
 pub mod speed;
 
 pub use freshness::{Reading, Reason, Validity};
-pub use senses::{FILTER_LAG, SensedState, Senses, SensesState, Tuning};
+pub use senses::{FILTER_LAG, SensedState, Senses, SensesState, Tuning, Zeros};

@@ -4,14 +4,15 @@
 //! The pre-tightener integrates duty into force behind a dead time and a lag. The reference goes
 //! through the same dead time and lag in a model, and the loop corrects the difference between
 //! that and the sensor (Smith 1957). With dead time, lag and slew all three standard
-//! deviations off it overshoots by less than 2.1 N; the nominal actuator by 0.3 N.
+//! deviations off it overshoots by less than 2.1 N; the nominal actuator by 0.3 N. Where spring
+//! and ramp together ask for more than the slew, the reference goes only as far as the screw can.
 
 #![deny(clippy::float_arithmetic)]
 
 use crate::model::timing::SLEW_PART;
 use crate::numeric::{LowPass, LowPassState, between, checked};
 use crate::rig::{Rig, RigError};
-use crate::units::{Duty, Newtons, NewtonsPerSecond, Q16, TICK_HZ, q16};
+use crate::units::{Duty, Newtons, NewtonsPerSecond, Q16, TICK_HZ, per_tick, q16};
 
 /// Longest dead time modelled, ticks; the rig's parameters end there.
 pub const LONGEST_DELAY: usize = 256;
@@ -24,10 +25,12 @@ const FASTEST_CORRECTION: f64 = 3.0;
 /// the preload run away faster than it is noticed.
 const CORRECTION_PART: f64 = 0.3;
 
-/// How far the model may be ahead of the preload before the reference waits, N.
-const LEAD: Newtons = q16(1_000_000);
-/// Part of its rate at which the reference then goes on: the slowest actuator that is no fault.
-const WAITING_PART: Q16 = q16(800_000);
+/// Dead times and lags of its slew that the preload may be behind the model before the reference
+/// waits: what the model makes with these off by half.
+const LEAD: f64 = 0.5;
+/// Part of its rate at which the reference then goes on: that of the slowest actuator that is no
+/// fault, which is also in time for the longest rise.
+const WAITING_PART: Q16 = q16(500_000);
 
 /// The actuator as known.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -40,6 +43,10 @@ pub struct PreloadLoop {
     correction: Q16,
     /// Largest rate of correction, N/s.
     most_correction: NewtonsPerSecond,
+    /// Largest rate of the actuator, N/s.
+    slew: NewtonsPerSecond,
+    /// See [`LEAD`], N.
+    lead: Newtons,
     delay: usize,
     lag: LowPass,
 }
@@ -77,11 +84,10 @@ impl PreloadLoop {
         Ok(Self {
             step: checked("preload.slew_n_per_s", slew * 1e-3)? * SLEW_PART,
             per_rate: checked("preload.slew_n_per_s", 1.0 / slew)?,
-            correction: checked(
-                "preload.delay_s",
-                (CORRECTION / (rig.preload.delay_s + rig.preload.lag_s)).min(FASTEST_CORRECTION),
-            )?,
+            correction: checked("preload.delay_s", correction(rig))?,
             most_correction: checked("preload.slew_n_per_s", slew * CORRECTION_PART)?,
+            slew: checked("preload.slew_n_per_s", slew)?,
+            lead: checked("preload.delay_s", LEAD * slew * rig.preload_latency_s())?,
             delay: ticks.min(LONGEST_DELAY - 1),
             lag: LowPass::build(rig.preload.lag_s),
         })
@@ -103,11 +109,13 @@ impl PreloadLoop {
         let change = between(target - state.reference, -self.step, self.step);
         // An actuator that does not keep up is waited for, but not without end.
         let behind = state.model.output() - measured;
-        let falls_back = if change < Q16::ZERO { behind < -LEAD } else { behind > LEAD };
-        state.reference += if falls_back { change * WAITING_PART } else { change };
+        let falls_back = if change < Q16::ZERO { behind < -self.lead } else { behind > self.lead };
+        let rate = change * Q16::from_num(TICK_HZ as i16) - drift;
+        let beyond = rate - between(rate, -self.slew, self.slew);
+        let change = if falls_back { change * WAITING_PART } else { change };
+        state.reference += change - Q16::narrow(per_tick(beyond));
         let delayed = state.exchange(self.delay);
         let expected = self.lag.step(&mut state.model, delayed);
-        let rate = change * Q16::from_num(TICK_HZ as i16) - drift;
         let correction = between(
             (expected - measured) * self.correction,
             -self.most_correction,
@@ -115,6 +123,19 @@ impl PreloadLoop {
         );
         Duty::saturating((rate + correction) * self.per_rate)
     }
+}
+
+/// Rate of correction per error, 1/s.
+#[allow(clippy::float_arithmetic, reason = "SI to machine units, once at start")]
+fn correction(rig: &Rig) -> f64 {
+    (CORRECTION / rig.preload_latency_s()).min(FASTEST_CORRECTION)
+}
+
+/// Time in which the loop answers what it was not told of, s: dead time, lag, and the time
+/// constant of its correction.
+#[allow(clippy::float_arithmetic, reason = "SI to machine units, once at start")]
+pub fn answer_s(rig: &Rig) -> f64 {
+    rig.preload_latency_s() + 1.0 / correction(rig)
 }
 
 impl PreloadLoopState {

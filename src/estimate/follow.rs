@@ -38,6 +38,11 @@ pub struct Follow<'a> {
 }
 
 impl Estimator {
+    /// Load on a tread at rest that is compressed by so much, N.
+    pub fn means(&self, compression: Millimetres) -> Newtons {
+        self.tread.means(compression)
+    }
+
     /// Begins a tick: position, and preload as the tread has it.
     pub fn begin_tick(&self, state: &mut EstimateState, sensed: &SensedState) {
         state.begin_tick(sensed.travel);

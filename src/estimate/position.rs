@@ -1,8 +1,9 @@
 //! What is known of the axial position.
 
+use crate::sense::Zeros;
 use crate::units::Millimetres;
 
-/// Position of the wheel by the record of the run before.
+/// Position of the wheel, and what its sensors showed unloaded, by the record of the run before.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Place {
     /// Axial position, mm.
@@ -10,6 +11,8 @@ pub struct Place {
     /// The bridges were off when the record ends, and the start followed at once: the wheel
     /// has coasted at most. If not, the drive ran unobserved, or the supply was away.
     pub sure: bool,
+    /// Zeros of the analogue sensors.
+    pub zeros: Zeros,
 }
 
 /// How far a position can be trusted after a restart.

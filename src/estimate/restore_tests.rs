@@ -92,7 +92,11 @@ proptest! {
 /// Position after a start with this record, if there is one, and whether the next step is
 /// searched.
 fn started(sensed: &SensedState, record: Option<(f64, bool)>) -> Option<(f64, bool)> {
-    let place = |(position, sure)| Place { position: Q16::from_num(position), sure };
+    let place = |(position, sure)| Place {
+        position: Q16::from_num(position),
+        sure,
+        zeros: Default::default(),
+    };
     let mut state = EstimateState::restored(record.map(place));
     let restored = estimator().restore(&mut state, sensed);
     assert_eq!(matches!(state.known, Position::Restored { .. }), restored);

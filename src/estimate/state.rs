@@ -287,7 +287,7 @@ mod tests {
             }
         }
         for (sure, confidence) in [(true, Sure), (false, Unsure)] {
-            let record = Some(Place { position: Q16::ZERO, sure });
+            let record = Some(Place { position: Q16::ZERO, sure, zeros: Default::default() });
             assert_eq!(EstimateState::restored(record).confidence(), confidence);
         }
     }

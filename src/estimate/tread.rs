@@ -11,7 +11,8 @@
 
 #![deny(clippy::float_arithmetic)]
 
-use crate::numeric::{LowPass, LowPassState, checked, divide};
+use crate::model::corner_profile::CornerProfile;
+use crate::numeric::{LowPass, LowPassState, checked, divide, sqrt};
 use crate::rig::{Rig, RigError};
 use crate::units::{Direction, Millimetres, Newtons, Q16, Ratio, Travel, q16};
 
@@ -57,6 +58,8 @@ const LONGEST: u16 = 4096;
 pub struct Tread {
     /// Relaxed stiffness of an element, N/mm.
     rate: Q16,
+    /// Load over the compression to the power 1.5, relaxed, N/mm^1.5.
+    relaxed: Q16,
     /// `s - 1`.
     excess: Ratio,
     memory: LowPass,
@@ -140,9 +143,21 @@ impl Tread {
         let spacing = SPACING * radius;
         let rate = 1e-9 * rig.tread.k_inf_pa_per_m * rig.rig.wheel_width_mm * spacing;
         let [from, to] = ROLLING.map(|part| part * radius);
+        // No farther than to where the first corner may touch.
+        let touch = CornerProfile::try_build(rig)?.first_contact(Direction::Deploy).to_num::<f64>();
+        let first = rig
+            .rig
+            .step_positions_mm
+            .first()
+            .map_or(to, |face| face - rig.rig.step_tolerance_mm - touch);
+        let to = to.min(first);
         let length = |mm| checked("rig.wheel_radius_mm", mm);
         Ok(Self {
             rate: checked("tread.k_inf_pa_per_m", rate)?,
+            relaxed: checked(
+                "tread.k_inf_pa_per_m",
+                (4.0 / 3.0 * rate / spacing * libm::sqrt(2.0 * radius)).min(f64::from(i16::MAX)),
+            )?,
             excess: checked("tread.stiffening", rig.tread.stiffening - 1.0)?,
             memory: LowPass::build(rig.tread.tau_s),
             spacing: length(spacing)?,
@@ -153,11 +168,15 @@ impl Tread {
     }
 
     /// Whether a wheel at rest may be on an edge, which presses the tread in twice as far: on a wall
-    /// that compression, relaxed, would carry twice the preload. Under little preload it may.
+    /// that compression would carry twice the preload. Under little preload it may.
     pub fn may_rest_on_edge(&self, preload: Newtons, compression: Millimetres) -> bool {
-        let depth = |index| self.depth(index, Q16::ZERO, compression);
-        let carried = (0..ELEMENTS).map(depth).fold(Q16::ZERO, |sum, depth| sum + depth);
-        preload < self.least || carried * self.rate > preload + preload
+        preload < self.least || self.means(compression) > preload + preload
+    }
+
+    /// Load on a relaxed tread that is compressed by so much, N: `4/3 k_inf L c sqrt(2 R c)`.
+    pub fn means(&self, compression: Millimetres) -> Newtons {
+        let depth = compression.max(Q16::ZERO);
+        sqrt(depth) * depth * self.relaxed
     }
 
     /// The wheel is at rest here and has been pressed like this for long.

@@ -28,8 +28,8 @@ pub fn free(page: &Page) -> Option<usize> {
 
 /// Double words of a snapshot.
 pub fn words(snapshot: &DriveSnapshot) -> [Word; 3] {
-    let [a, b, c, d, e] = snapshot.seal();
-    [[a, b], [c, d], [e, u32::MAX]]
+    let [a, b, c, d, e, f] = snapshot.seal();
+    [[a, b], [c, d], [e, f]]
 }
 
 /// An entry that no start has reported yet.

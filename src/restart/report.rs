@@ -85,6 +85,7 @@ impl Restart {
         Some(Place {
             position: snapshot.position + travel,
             sure: unwatched <= FRESH && !self.was_away() && snapshot.level < DriveSnapshot::UNSURE,
+            zeros: snapshot.packed_zeros.zeros(),
         })
     }
 

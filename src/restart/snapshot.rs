@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::{SNAPSHOT_WORDS, check};
+use crate::sense::Zeros;
 use crate::supervise::Mode;
 use crate::supervise::codes;
 use crate::units::{Millimetres, MillimetresPerSecond, Q16, Tick};
@@ -31,6 +32,32 @@ impl PackedSpeed {
     /// Whether the position was better than a guess.
     pub const fn placed(self) -> bool {
         self.0 & 1 != 0
+    }
+}
+
+/// Zeros of preload and compression sensor, in 1/256 N and 1/16384 mm, saturating: 128 N and 2 mm.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct PackedZeros(pub(super) i16, pub(super) i16);
+
+impl PackedZeros {
+    /// Bits that are cut.
+    const COARSER: (u32, u32) = (8, 2);
+
+    /// From the zeros.
+    pub fn of(zeros: Zeros) -> Self {
+        let pack = |value: Q16, cut: u32| {
+            (value.to_bits() >> cut).clamp(i16::MIN.into(), i16::MAX.into()) as i16
+        };
+        Self(pack(zeros.preload, Self::COARSER.0), pack(zeros.compression, Self::COARSER.1))
+    }
+
+    /// The zeros.
+    pub fn zeros(self) -> Zeros {
+        let unpack = |bits: i16, cut: u32| Q16::from_bits(i32::from(bits) << cut);
+        Zeros {
+            preload: unpack(self.0, Self::COARSER.0),
+            compression: unpack(self.1, Self::COARSER.1),
+        }
     }
 }
 
@@ -104,6 +131,8 @@ pub struct DriveSnapshot {
     pub missed: MissedCheckIns,
     /// Speed reference, and whether the position was better than a guess.
     pub packed_speed: PackedSpeed,
+    /// Zeros of the analogue sensors.
+    pub packed_zeros: PackedZeros,
 }
 
 impl DriveSnapshot {
@@ -118,13 +147,15 @@ impl DriveSnapshot {
         let state = u32::from(self.mode) | u32::from(self.level) << 8 | u32::from(self.fault) << 16;
         let missed = u32::from(self.missed.bits()) | u32::from(self.packed_speed.0 as u16) << 16;
         let [a, b, c, d] = [self.tick, self.position.to_bits() as u32, state, missed];
-        [a, b, c, d, check(Self::SEED, &[a, b, c, d])]
+        let PackedZeros(preload, compression) = self.packed_zeros;
+        let e = u32::from(preload as u16) | u32::from(compression as u16) << 16;
+        [a, b, c, d, e, check(Self::SEED, &[a, b, c, d, e])]
     }
 
     /// From words, if they are intact.
     pub fn open(words: &[u32; SNAPSHOT_WORDS]) -> Option<Self> {
-        let [tick, position, state, missed, sum] = *words;
-        (check(Self::SEED, &[tick, position, state, missed]) == sum).then_some(Self {
+        let [tick, position, state, missed, zeros, sum] = *words;
+        (check(Self::SEED, &[tick, position, state, missed, zeros]) == sum).then_some(Self {
             tick,
             position: Q16::from_bits(position as i32),
             mode: state as u8,
@@ -132,6 +163,7 @@ impl DriveSnapshot {
             fault: (state >> 16) as u16,
             missed: MissedCheckIns::from_bits(missed as u16),
             packed_speed: PackedSpeed((missed >> 16) as i16),
+            packed_zeros: PackedZeros(zeros as i16, (zeros >> 16) as i16),
         })
     }
 

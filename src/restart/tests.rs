@@ -2,13 +2,15 @@
 
 use super::*;
 use crate::fault::Fault;
+use crate::sense::Zeros;
 use crate::units::Q16;
 use proptest::prelude::*;
 
 fn snapshot() -> impl Strategy<Value = DriveSnapshot> {
-    let bits = (any::<u8>(), any::<u8>(), any::<u16>(), any::<u16>(), any::<i16>());
+    let bits =
+        (any::<u8>(), any::<u8>(), any::<u16>(), any::<u16>(), any::<i16>(), any::<(i16, i16)>());
     (any::<u32>(), any::<i32>(), bits).prop_map(
-        |(tick, position, (mode, level, fault, missed, packed_speed))| DriveSnapshot {
+        |(tick, position, (mode, level, fault, missed, packed_speed, zeros))| DriveSnapshot {
             tick,
             position: Q16::from_bits(position),
             mode,
@@ -16,6 +18,7 @@ fn snapshot() -> impl Strategy<Value = DriveSnapshot> {
             fault,
             missed: MissedCheckIns::from_bits(missed),
             packed_speed: PackedSpeed(packed_speed),
+            packed_zeros: PackedZeros(zeros.0, zeros.1),
         },
     )
 }
@@ -71,7 +74,9 @@ proptest! {
 
 #[test]
 fn the_later_place_counts_also_when_the_clock_wraps() {
-    let at = |tick| Some(DriveSnapshot::open(&[0; 5]).unwrap_or(DriveSnapshot { tick, ..EMPTY }));
+    let at = |tick| {
+        Some(DriveSnapshot::open(&[0; SNAPSHOT_WORDS]).unwrap_or(DriveSnapshot { tick, ..EMPTY }))
+    };
     assert_eq!(later(at(7), at(8)), at(8));
     assert_eq!(later(at(8), at(7)), at(8));
     assert_eq!(later(at(u32::MAX), at(0)), at(0));
@@ -88,7 +93,19 @@ const EMPTY: DriveSnapshot = DriveSnapshot {
     fault: 0,
     missed: MissedCheckIns::NOBODY,
     packed_speed: PackedSpeed(0),
+    packed_zeros: PackedZeros(0, 0),
 };
+
+#[test]
+fn zeros_are_kept_to_a_noise_s_part() {
+    for (preload, compression) in [(0.0, 0.0), (3.0, 0.1), (-6.0, -0.15), (60.0, 1.5)] {
+        let zeros =
+            Zeros { preload: Q16::from_num(preload), compression: Q16::from_num(compression) };
+        let read = PackedZeros::of(zeros).zeros();
+        assert!((read.preload.to_num::<f64>() - preload).abs() < 0.004, "{read:?}");
+        assert!((read.compression.to_num::<f64>() - compression).abs() < 1e-4, "{read:?}");
+    }
+}
 
 #[test]
 fn a_pace_is_the_speed_to_a_32nd() {

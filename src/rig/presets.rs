@@ -56,6 +56,7 @@ impl Rig {
             sense: Sensors {
                 encoder_counts: 8192.0,
                 preload_full_scale_n: 200.0,
+                preload_error: 0.015,
                 tread_full_scale_mm: 5.0,
                 angle_zero_code: 2000.0,
                 stale_after_s: 0.020,

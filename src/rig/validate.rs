@@ -2,11 +2,6 @@
 
 use super::Rig;
 
-/// Preload kept free below the limit for regulation, relative to the limit: gain of the preload
-/// sensor, and the spring's compression in a climb beyond the feed-forward. On the presets no rig
-/// within its tolerances exceeds the limit with it.
-pub(crate) const REGULATION_PART: f64 = 0.045;
-
 /// Reserve of the preload with which the wheel begins to roll: load, friction and a preload sensor
 /// near its zero are known less well than under way, and a tread that rests under more preload
 /// shows better what it is.
@@ -59,6 +54,17 @@ pub enum RigError {
         /// Least upper value over the lower one.
         ratio: f64,
     },
+    /// A value with which the drive could not do its work.
+    Unable {
+        /// The value found.
+        value: f64,
+        /// What it has to keep.
+        bound: Bound,
+        /// What happens beyond it.
+        reason: &'static str,
+        /// Key of the parameter, then those that set the bound.
+        keys: &'static [&'static str],
+    },
     /// The arm cannot reach a wall at this radius.
     OutOfReach {
         /// Wheel-centre radius asked for, mm.
@@ -89,6 +95,10 @@ impl core::fmt::Display for RigError {
                 "{upper} = {value}: expected at least {:.1}, as {lower} = {other}",
                 other * ratio
             ),
+            Self::Unable { value, bound, reason, keys } => {
+                let key = keys.first().unwrap_or(&"rig");
+                write!(f, "{key} = {value}: expected {bound}: {reason}")
+            }
             Self::OutOfReach { radius_mm, min_mm, max_mm } => write!(
                 f,
                 "rig.arm_length_mm: the arm reaches wheel-centre radii from {min_mm:.1} to {max_mm:.1} mm, expected to include {radius_mm:.1} mm"
@@ -112,6 +122,7 @@ impl RigError {
             ],
             Self::StepBeyondTravel { .. } => &["rig.step_positions_mm", "rig.travel_mm"],
             Self::Pair { upper, .. } => core::slice::from_ref(&upper.0),
+            Self::Unable { keys, .. } => keys,
             Self::OutOfReach { .. } => &[
                 "rig.arm_length_mm",
                 "rig.arm_pivot_radius_mm",
@@ -147,13 +158,24 @@ pub enum Bound {
     AtMost(f64),
 }
 
+impl core::fmt::Display for Bound {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        // Rounded so that the number itself is within the bound.
+        match *self {
+            Self::AtLeast(least) => write!(f, "at least {:.2}", libm::ceil(least * 100.0) / 100.0),
+            Self::AtMost(most) => write!(f, "at most {:.2}", libm::floor(most * 100.0) / 100.0),
+        }
+    }
+}
+
 impl Rig {
     /// Checks every value against its range and the values against one another.
     pub fn validate(&self) -> Result<(), RigError> {
         self.ranges()?;
         self.step_table()?;
         self.pairs()?;
-        self.reach()
+        self.reach()?;
+        self.abilities()
     }
 
     /// Values that bound one another.
@@ -162,14 +184,9 @@ impl Rig {
         let safe = ("control.safe_speed_mm_s", self.control.safe_speed_mm_s);
         let least = ("drive.min_crossing_speed_mm_s", self.drive.min_crossing_speed_mm_s);
         let top = ("drive.no_load_speed_mm_s", self.drive.no_load_speed_mm_s);
-        let limit = ("preload.limit_n", self.preload.limit_n);
-        let pressed = ("preload.cruise_n", self.preload.cruise_n);
-        for (upper, lower, ratio) in [
-            (safe, least, 1.0),
-            (cruise, safe, 1.0),
-            (top, cruise, TOP_SPEED_RESERVE),
-            (limit, pressed, 1.0 / (1.0 - REGULATION_PART)),
-        ] {
+        for (upper, lower, ratio) in
+            [(safe, least, 1.0), (cruise, safe, 1.0), (top, cruise, TOP_SPEED_RESERVE)]
+        {
             if upper.1 < lower.1 * ratio {
                 return Err(RigError::Pair { upper, lower, ratio });
             }
@@ -197,13 +214,13 @@ impl Rig {
     }
 
     /// Keys with their value and its least and largest value.
-    pub const fn bounds(&self) -> [(&'static str, f64, f64, f64); 45] {
+    pub const fn bounds(&self) -> [(&'static str, f64, f64, f64); 46] {
         [
             ("rig.wheel_radius_mm", self.rig.wheel_radius_mm, 10.0, 150.0),
             ("rig.wheel_wear_mm", self.rig.wheel_wear_mm, 0.0, 0.2),
             ("rig.wheel_width_mm", self.rig.wheel_width_mm, 1.0, 200.0),
             ("rig.step_height_mm", self.rig.step_height_mm, 1.5, 8.0),
-            ("rig.step_tolerance_mm", self.rig.step_tolerance_mm, 0.05, 5.0),
+            ("rig.step_tolerance_mm", self.rig.step_tolerance_mm, 0.1, 5.0),
             ("rig.travel_mm", self.rig.travel_mm, 1.0, 2000.0),
             ("rig.wall_radius_mm", self.rig.wall_radius_mm, 50.0, 1000.0),
             ("rig.arm_length_mm", self.rig.arm_length_mm, 20.0, 1000.0),
@@ -225,7 +242,7 @@ impl Rig {
             ("preload.lag_s", self.preload.lag_s, 0.005, 1.0),
             ("drive.no_load_speed_mm_s", self.drive.no_load_speed_mm_s, 5.0, 300.0),
             ("drive.stall_force_n", self.drive.stall_force_n, 5.0, 5000.0),
-            ("drive.force_limit_n", self.drive.force_limit_n, 5.0, 5000.0),
+            ("drive.force_limit_n", self.drive.force_limit_n, 5.0, 1000.0),
             ("drive.reflected_mass_kg", self.drive.reflected_mass_kg, 0.1, 1000.0),
             ("drive.cruise_speed_mm_s", self.drive.cruise_speed_mm_s, 3.0, 100.0),
             ("drive.min_crossing_speed_mm_s", self.drive.min_crossing_speed_mm_s, 0.5, 20.0),
@@ -236,6 +253,7 @@ impl Rig {
             ("sense.encoder_counts", self.sense.encoder_counts, 1024.0, 65_536.0),
             ("sense.preload_full_scale_n", self.sense.preload_full_scale_n, 20.0, 2000.0),
             ("sense.tread_full_scale_mm", self.sense.tread_full_scale_mm, 0.5, 50.0),
+            ("sense.preload_error", self.sense.preload_error, 0.0, 0.3),
             ("sense.angle_zero_code", self.sense.angle_zero_code, 0.0, 16_383.0),
             ("sense.stale_after_s", self.sense.stale_after_s, 0.005, 1.0),
             ("control.gap_ref_mm", self.control.gap_ref_mm, 0.0, 10.0),

@@ -105,6 +105,11 @@ impl AnalogChannel {
         })
     }
 
+    /// Largest zero correction, units.
+    pub const fn zero_limit(&self) -> Q16 {
+        self.zero_limit
+    }
+
     /// One tick with the latest sample, new or not; `limit` is the largest age, ticks.
     pub fn step(
         &self,
@@ -167,6 +172,16 @@ impl AnalogChannel {
 }
 
 impl AnalogState {
+    /// A start with this offset.
+    pub fn with(offset: Q16) -> Self {
+        Self { offset, ..Self::default() }
+    }
+
+    /// The offset that applies.
+    pub const fn offset(&self) -> Q16 {
+        self.offset
+    }
+
     /// Starts averaging the zero from the next good code on.
     pub fn begin_zero(&mut self) {
         self.zeroing = Zeroing::Running { sum: 0, count: 0 };

@@ -123,6 +123,11 @@ impl Senses {
         })
     }
 
+    /// Largest zero correction of the preload sensor, N.
+    pub const fn preload_zero_limit(&self) -> Newtons {
+        self.preload_sensor.zero_limit()
+    }
+
     /// One tick: `frame` holds the latest codes, new or not; `acceleration` is that of the speed
     /// profile in this tick, mm/s^2.
     pub fn step(
@@ -167,7 +172,33 @@ impl Senses {
     }
 }
 
+/// What preload and compression sensor show unloaded.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Zeros {
+    /// Preload sensor, N.
+    pub preload: Newtons,
+    /// Compression sensor, mm.
+    pub compression: Millimetres,
+}
+
 impl SensesState {
+    /// A start with these zeros.
+    pub fn with(zeros: Zeros) -> Self {
+        Self {
+            preload_sensor: AnalogState::with(zeros.preload),
+            compression_sensor: AnalogState::with(zeros.compression),
+            ..Self::default()
+        }
+    }
+
+    /// The zeros that apply.
+    pub const fn zeros(&self) -> Zeros {
+        Zeros {
+            preload: self.preload_sensor.offset(),
+            compression: self.compression_sensor.offset(),
+        }
+    }
+
     /// Starts taking the zero of preload and compression sensor.
     pub fn begin_zero(&mut self) {
         self.preload_sensor.begin_zero();

@@ -7,7 +7,7 @@
 
 use crate::fault::Fault;
 use crate::numeric::checked;
-use crate::rig::{Rig, RigError};
+use crate::rig::{Rig, RigError, SHORT_PART, START_LAG_MM};
 use crate::units::{
     Millimetres, MillimetresPerSecond, Newtons, Q16, Ratio, Tick, Travel, per_tick, q16,
 };
@@ -21,15 +21,14 @@ const KEPT: usize = 16;
 /// `1 / (6 ms)^2`, 530 mm/s^2 beyond the reference: twice the acceleration of the profile. The
 /// worst of the random rigs is 2.1.
 const BENT_COUNTS: f64 = 2.5;
-/// Distance off the reference within two spans, mm: the dips behind a step make 0.11.
-const OFF: Millimetres = q16(150_000);
-/// Distance that counts as progress of the wheel, mm: two counts and a half.
-const PROGRESS: Millimetres = q16(50_000);
-/// Travel of the reference that a wheel which has turned may stay behind, mm.
-const LAG: Millimetres = q16(400_000);
-/// The same before it has turned, mm: on a corner the speed loop first has to find the duty that
-/// lifts it, 0.2 s at half the crossing speed.
-const START_LAG: Millimetres = q16(2_000_000);
+/// Distance off the reference within two spans, mm: the dips behind a step make 0.11, and two
+/// readings of a counter are off by a count.
+const OFF_MM: f64 = 0.11;
+const OFF_COUNTS: f64 = 2.0;
+/// Distance that counts as progress of the wheel, counts.
+const PROGRESS_COUNTS: f64 = 2.5;
+/// Travel of the reference that a wheel which has turned may stay behind, mm, beside its progress.
+const LAG_MM: f64 = 0.35;
 /// Number of progresses after which the wheel counts as turned.
 const TURNED: u8 = 10;
 /// Ticks within which arm and wheel are compared.
@@ -46,9 +45,12 @@ const EFFORT: (Ratio, Ratio) = (q16(-50_000), q16(130_000));
 /// Ticks for which it must be outside: more than two time constants of the loop, in which it
 /// settles after a corner.
 const EFFORT_TICKS: u8 = 120;
-/// Deviation of the preload from its model, part of the cruise preload: 0.18 at the ramps of an
-/// actuator whose dead time, lag and slew are all off.
-const STRAYED_PART: f64 = 0.25;
+/// Dead times and lags of its slew by which a preload may be short: what it makes with these off by
+/// half. At least a part of the cruise preload.
+const SHORT_LATENCIES: f64 = 0.5;
+/// Deviation of the preload from its model that is a fault, over what is short: 1.8 at the ramps of
+/// an actuator whose dead time, lag and slew are all off.
+const STRAYED: f64 = 2.5;
 /// Ticks for which it must deviate.
 const STRAYED_TICKS: u8 = 10;
 /// Equal codes in a row that count as stuck if the preload has to change meanwhile, or if nothing
@@ -70,9 +72,15 @@ const ERRATIC: u8 = 60;
 
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(super) struct CrossCheck {
-    /// See [`BENT_COUNTS`], mm.
+    /// See [`BENT_COUNTS`], [`OFF_MM`], [`PROGRESS_COUNTS`], [`LAG_MM`], mm.
     bent: Millimetres,
-    /// See [`STRAYED_PART`], N.
+    off: Millimetres,
+    progress: Millimetres,
+    lag: Millimetres,
+    /// See [`START_LAG_MM`], mm.
+    start_lag: Millimetres,
+    /// See [`SHORT_LATENCIES`] and [`STRAYED`], N.
+    short: Newtons,
     strayed: Newtons,
 }
 
@@ -178,6 +186,8 @@ pub(super) struct Compared {
     pub(super) preload: Newtons,
     /// Preload that the actuator should have reached by now, N.
     pub(super) preload_due: Newtons,
+    /// Preload beyond that and what the spring's own motion makes, N.
+    pub(super) preload_off: Newtons,
     /// Compression of the tread, mm.
     pub(super) compression: Millimetres,
     /// Speed reference, signed outwards, mm/s.
@@ -193,9 +203,17 @@ impl CrossCheck {
     pub(super) fn try_build(rig: &Rig) -> Result<Self, RigError> {
         let turn_mm = 2.0 * core::f64::consts::PI * rig.rig.wheel_radius_mm;
         let count_mm = turn_mm / rig.sense.encoder_counts;
+        let counts = |mm: f64| checked("sense.encoder_counts", mm);
+        let late = SHORT_LATENCIES * rig.preload.slew_n_per_s * rig.preload_latency_s();
+        let short = late.max(SHORT_PART * rig.preload.cruise_n);
         Ok(Self {
-            bent: checked("sense.encoder_counts", BENT_COUNTS * count_mm)?,
-            strayed: checked("preload.cruise_n", STRAYED_PART * rig.preload.cruise_n)?,
+            bent: counts(BENT_COUNTS * count_mm)?,
+            off: counts(OFF_MM + OFF_COUNTS * count_mm)?,
+            progress: counts(PROGRESS_COUNTS * count_mm)?,
+            start_lag: counts(START_LAG_MM)?,
+            lag: counts(LAG_MM + PROGRESS_COUNTS * count_mm)?,
+            short: checked("preload.slew_n_per_s", short)?,
+            strayed: checked("preload.slew_n_per_s", STRAYED * short)?,
         })
     }
 
@@ -209,13 +227,18 @@ impl CrossCheck {
         let (preload, due) = (seen.preload, seen.preload_due);
         let limits = Limits { stuck: noise.preload.stuck, jump: JUMP_N, due: self.telling() };
         let unsound = judge(&mut state.preload, preload, due, &limits);
-        let off = (preload - due).abs() > self.strayed;
+        let off = seen.preload_off.abs() > self.strayed;
         let strayed = lasts(&mut state.strayed, off, STRAYED_TICKS);
         if unsound {
             Some(Fault::PreloadSensorImplausible)
         } else {
             strayed.then_some(Fault::PretightenerRunaway)
         }
+    }
+
+    /// Deviation by which a preload is short, N.
+    pub(super) const fn short(&self) -> Newtons {
+        self.short
     }
 
     /// Change of the preload that no sensor sleeps through, N: half of what counts as astray.
@@ -233,7 +256,7 @@ impl CrossCheck {
         let bent = self.bends(state, seen);
         // Without a new reading the wheel's position is unknown.
         let fresh = seen.read_at == seen.now;
-        let lags = fresh && lags(state, seen);
+        let lags = fresh && self.lags(state, seen);
         let preload = self.preload(state, noise, seen);
         let stuck = noise.compression.stuck;
         let limits = Limits { stuck, jump: JUMP_MM, due: self.telling() };
@@ -282,21 +305,21 @@ impl CrossCheck {
             state.held = if missed { 0 } else { state.held + 1 };
             return false;
         }
-        ((now - middle) - (middle - old)).abs() > self.bent || (now - old).abs() > OFF
+        ((now - middle) - (middle - old)).abs() > self.bent || (now - old).abs() > self.off
     }
-}
 
-/// Whether the reference goes on while the wheel does not.
-fn lags(state: &mut CrossState, seen: &Compared) -> bool {
-    let (travel, reference) = state.progress;
-    let moved = Q16::narrow(seen.travel.saturating_sub(travel));
-    if moved.abs() > PROGRESS {
-        state.progress = (seen.travel, state.reference);
-        state.turned = state.turned.saturating_add(1).min(TURNED);
-        return false;
+    /// Whether the reference goes on while the wheel does not.
+    fn lags(&self, state: &mut CrossState, seen: &Compared) -> bool {
+        let (travel, reference) = state.progress;
+        let moved = Q16::narrow(seen.travel.saturating_sub(travel));
+        if moved.abs() > self.progress {
+            state.progress = (seen.travel, state.reference);
+            state.turned = state.turned.saturating_add(1).min(TURNED);
+            return false;
+        }
+        let most = if state.turned < TURNED { self.start_lag } else { self.lag };
+        Q16::narrow(state.reference.saturating_sub(reference)).abs() > most
     }
-    let most = if state.turned < TURNED { START_LAG } else { LAG };
-    Q16::narrow(state.reference.saturating_sub(reference)).abs() > most
 }
 
 /// Whether the arm has moved farther than the wheel.

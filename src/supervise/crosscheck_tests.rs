@@ -52,6 +52,7 @@ fn found(mut at: impl FnMut(f64) -> Rolls) -> Option<(Fault, i32)> {
             radius: Q16::from_num(now.radius),
             preload: Q16::from_num(now.preload + 0.3 * noise),
             preload_due: Q16::from_num(now.due),
+            preload_off: Q16::from_num(now.preload - now.due),
             compression: Q16::from_num(now.compression + 0.012 * noise),
             speed_ref: Q16::from_num(speed_ref),
             effort: now.effort.map(Q16::from_num),
@@ -281,6 +282,7 @@ proptest! {
                 radius: Q16::from_bits(radius),
                 preload: Q16::from_bits(preload),
                 preload_due: Q16::from_bits(due),
+                preload_off: Q16::from_bits(preload) - Q16::from_bits(due),
                 compression: Q16::from_bits(compression),
                 speed_ref: Q16::from_bits(speed_ref),
                 effort: Some(Q16::from_bits(effort)),
@@ -300,6 +302,7 @@ fn off_by(now: Tick, off: Millimetres) -> Compared {
         radius: q16(125_000_000),
         preload: q16(40_000_000),
         preload_due: q16(40_000_000),
+        preload_off: Q16::ZERO,
         compression: q16(400_000),
         speed_ref: Q16::ZERO,
         effort: None,
@@ -346,12 +349,13 @@ fn off_by_exactly_the_threshold_is_tolerated() {
         };
         check.bends(&mut state, &off_by(1, distance))
     };
-    assert!(!drifts(OFF) && !drifts(-OFF));
-    assert!(drifts(OFF + Q16::DELTA) && drifts(-OFF - Q16::DELTA));
+    let off = check.off;
+    assert!(!drifts(off) && !drifts(-off));
+    assert!(drifts(off + Q16::DELTA) && drifts(-off - Q16::DELTA));
     let strays = |off: Newtons| {
         let mut state = CrossState::default();
         let at = off_by(1, Q16::ZERO);
-        let seen = Compared { preload: at.preload_due + off, ..at };
+        let seen = Compared { preload: at.preload_due + off, preload_off: off, ..at };
         (0..50).find_map(|_| check.preload(&mut state, &Noise::default(), &seen))
     };
     assert_eq!(strays(check.strayed), None);
@@ -367,6 +371,7 @@ fn a_preload_astray_before_the_drive_starts_is_counted_on() {
     let check = CrossCheck::try_build(&Rig::prototype()).expect("a sound rig");
     let astray = |tick: Tick| Compared {
         preload: q16(55_000_000) + Q16::from_bits(i32::from(tick.is_multiple_of(7))),
+        preload_off: q16(15_000_000),
         ..off_by(tick, Q16::ZERO)
     };
     let (before, noise) = (STRAYED_TICKS - 3, Noise::default());

@@ -43,10 +43,14 @@ pub fn at_rest(sensed: &SensedState) -> bool {
     sensed.speed.value.abs() < REST
 }
 
-/// Whether the wheel lies unloaded on the outermost wall, so that zeros can be taken.
-pub fn stowed(sensed: &SensedState) -> bool {
+/// Whether the wheel lies unloaded on the outermost wall, so that zeros can be taken. A preload
+/// sensor farther off is believed less than a tread that is pressed by less than half of what it
+/// shows: this compression means `pressed`, N. Its zero is taken as far as `zero_limit`, N.
+pub fn stowed(sensed: &SensedState, pressed: Newtons, zero_limit: Newtons) -> bool {
+    let shown = sensed.preload_filtered;
+    let off = shown.abs() <= zero_limit && pressed < shown.abs().half();
     sensed.level == 0
-        && sensed.preload_filtered.abs() < UNLOADED
+        && (shown.abs() < UNLOADED || off)
         && sensed.compression_filtered.abs() < UNPRESSED
 }
 
@@ -78,17 +82,27 @@ mod tests {
             (0, 2.9, 0.09, true),
             (0, -2.9, -0.09, true),
             (1, 0.0, 0.0, false),
-            (0, 3.0, 0.0, false),
-            (0, -3.1, 0.0, false),
+            (0, 3.0, 0.06, false),
+            (0, -3.1, 0.0, true),
+            // Of a cell that shows 4 N with a tread that is not pressed; 2 N press it by 0.05 mm.
+            (0, 4.0, 0.0, true),
+            (0, 4.0, 0.04, true),
+            (0, 4.0, 0.06, false),
+            (0, 6.1, 0.0, false),
             (0, 0.0, 0.11, false),
             (0, 0.0, -0.11, false),
         ] {
             let seen = sensed(level, 0.0, preload, compression);
-            assert_eq!(stowed(&seen), expected, "{level} {preload} {compression}");
+            let pressed = Q16::from_num(159.5 * compression.max(0.0).powf(1.5));
+            assert_eq!(
+                stowed(&seen, pressed, q16(6_000_000)),
+                expected,
+                "{level} {preload} {compression}"
+            );
         }
         let mut edge = sensed(0, 0.0, 0.0, 0.0);
         edge.compression_filtered = UNPRESSED;
-        assert!(!stowed(&edge));
+        assert!(!stowed(&edge, Q16::ZERO, q16(6_000_000)));
     }
 
     #[test]

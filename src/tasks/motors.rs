@@ -52,7 +52,12 @@ pub async fn motors(
         }
         exchange.publish(output);
         let missed = exchange.liveness.missed(now);
-        watchdog.keep(&recorder.snapshot(&output.telemetry, state.confidence(), missed));
+        watchdog.keep(&recorder.snapshot(
+            &output.telemetry,
+            state.confidence(),
+            missed,
+            state.zeros(),
+        ));
         if missed.is_nobody() {
             watchdog.feed();
         }

@@ -1,14 +1,14 @@
 //! From a rig to the controller's machine units, once at start.
 
 use super::Controller;
-use crate::control::preload_loop::PreloadLoop;
+use crate::control::preload_loop::{PreloadLoop, answer_s};
 use crate::control::profile::Profile;
 use crate::control::schedule::Schedule;
 use crate::control::speed_loop::SpeedLoop;
 use crate::estimate::Estimator;
 use crate::estimate::vibration::VibrationObserver;
 use crate::numeric::checked;
-use crate::rig::{Rig, RigError};
+use crate::rig::{CLIMB_PART, Rig, RigError};
 use crate::sense::{Senses, Tuning};
 use crate::supervise::Monitor;
 use crate::units::TICK_HZ;
@@ -16,9 +16,6 @@ use crate::units::TICK_HZ;
 /// Bandwidth of the speed observer, rad/s: three times the speed loop's crossover;
 /// an encoder count every 2 ms at crossing speed leaves it quiet enough.
 const OBSERVER_RAD_S: f64 = 60.0;
-
-/// Part of the pre-tightener's slew that the spring may take while the wheel climbs.
-const CLIMB_PART: f64 = 0.9;
 
 impl Controller {
     /// Turns a rig into machine units, once; fails where a parameter is out of range or does
@@ -37,14 +34,15 @@ impl Controller {
             profile: Profile::try_build(rig)?,
             speed_loop: SpeedLoop::try_build(rig)?,
             preload_loop: PreloadLoop::try_build(rig)?,
-            preload_timeout: ((2.0 * preload.limit_n / preload.slew_n_per_s + 1.0)
+            preload_timeout: ((2.0 * preload.limit_n / preload.slew_n_per_s
+                + (2.0 * answer_s(rig)).max(1.0))
                 * f64::from(TICK_HZ)) as u32,
             climb_speed: checked(
                 "preload.spring_n_per_mm",
                 (CLIMB_PART * preload.slew_n_per_s / preload.spring_n_per_mm).min(1000.0),
             )?,
             spring: checked("preload.spring_n_per_mm", preload.spring_n_per_mm)?,
-            preload_latency: checked("preload.delay_s", preload.delay_s + preload.lag_s)?,
+            preload_latency: checked("preload.delay_s", rig.preload_latency_s())?,
             load: checked("plant.top_load_n", load)?,
             arm_thrust_max: checked(
                 "plant.arm_coupling",

@@ -84,7 +84,9 @@ impl Controller {
     fn await_rest(&self, state: &mut State, tick: &mut TickContext<'_>) {
         state.condition_ticks = if at_rest(tick.sensed) { state.condition_ticks + 1 } else { 0 };
         if state.condition_ticks >= TEST_TICKS {
-            tick.trigger(Trigger::TestPassed { stowed: stowed(tick.sensed) });
+            let pressed = self.estimator.means(tick.sensed.compression_filtered);
+            let stowed = stowed(tick.sensed, pressed, self.senses.preload_zero_limit());
+            tick.trigger(Trigger::TestPassed { stowed });
         } else if state.in_mode >= REST_TICKS {
             tick.fail(Fault::SelfTest);
         }

@@ -58,6 +58,9 @@ impl Controller {
         if let Some(outcome) = plan.outcome.as_ref() {
             planning.scale = outcome.scale;
             planning.reserve = outcome.reserve;
+            // What a crossing has shown counts for more than what the tread showed before.
+            let trusted = planning.review.is_some_and(|review| review.trusted);
+            planning.unknown &= !trusted || outcome.strange || outcome.wide;
             if outcome.bounded {
                 tick.log(Event::Limit(Limit::AdaptationBounded));
             }
@@ -148,8 +151,10 @@ fn lead_time(open: &OpenCrossing, lifted_at: Tick) -> Seconds {
 mod tests {
     use super::super::tests::{sensed, within};
     use super::*;
+    use crate::model::{Planner, Review};
+    use crate::rig::Rig;
     use crate::supervise::Leg;
-    use crate::units::{Direction, q16};
+    use crate::units::{Direction, Q16, q16};
 
     /// In motion on the first wall.
     fn running() -> State {
@@ -210,6 +215,44 @@ mod tests {
             controller.transit(&mut state, pass);
         });
         assert_eq!(state.mode, Mode::FaultHold(Fault::PreloadNotReached));
+    }
+
+    #[test]
+    fn a_trusted_crossing_clears_what_the_tread_showed_before_it() {
+        let planner = Planner::try_build(&Rig::prototype()).expect("sound");
+        let review = Review {
+            direction: Direction::Deploy,
+            speed: q16(8_000_000),
+            preload: q16(45_000_000),
+            tan_arm: Q16::ONE,
+            gap: Q16::ZERO,
+            seen: Q16::ZERO,
+            trusted: false,
+        };
+        let answer = |review: Review| {
+            planner.plan(&PlanRequest {
+                sequence: 1,
+                direction: Direction::Deploy,
+                step: 2,
+                scale: Q16::ONE,
+                unknown: true,
+                reserve: Q16::ONE,
+                preload: q16(50_000_000),
+                distance: q16(20_000_000),
+                review: Some(review),
+            })
+        };
+        let gap = answer(review).outcome.expect("a review").gap_predicted;
+        for trusted in [false, true] {
+            let review = Review { gap, trusted, ..review };
+            let mut state = running();
+            (state.planning.sequence, state.planning.unknown) = (1, true);
+            state.planning.review = Some(review);
+            within(&sensed(0, 0.0, 0.3), |controller, pass| {
+                controller.take_plan(&mut state, pass, Some(&answer(review)));
+            });
+            assert_eq!(state.planning.unknown, !trusted);
+        }
     }
 
     #[test]

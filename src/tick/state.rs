@@ -7,7 +7,7 @@ use crate::estimate::crossing::Contact;
 use crate::estimate::vibration::VibrationTracking;
 use crate::estimate::{ContactStage, EstimateState, OpenCrossing, Place, PositionConfidence};
 use crate::model::{Plan, Review};
-use crate::sense::SensesState;
+use crate::sense::{SensesState, Zeros};
 use crate::supervise::service::ServiceState;
 use crate::supervise::{Leg, Mode, MonitorState};
 use crate::units::{Direction, MillimetresPerSecond, MillimetresPerSecond2, Q16, Ratio, Tick};
@@ -97,7 +97,16 @@ impl Default for Planning {
 impl State {
     /// State of a start with this record of the wheel's position, if there is one.
     pub fn restored(record: Option<Place>) -> Self {
-        Self { estimate: EstimateState::restored(record), ..Self::default() }
+        Self {
+            estimate: EstimateState::restored(record),
+            senses: SensesState::with(record.map(|place| place.zeros).unwrap_or_default()),
+            ..Self::default()
+        }
+    }
+
+    /// Zeros of the analogue sensors, for a restart.
+    pub const fn zeros(&self) -> Zeros {
+        self.senses.zeros()
     }
 
     /// Confidence of the position, for a restart.
@@ -183,6 +192,14 @@ impl State {
 mod tests {
     use super::*;
     use crate::units::q16;
+
+    #[test]
+    fn a_start_has_the_zeros_of_its_record() {
+        let zeros = Zeros { preload: q16(3_000_000), compression: q16(100_000) };
+        let place = Place { position: q16(30_000_000), sure: true, zeros };
+        assert_eq!(State::restored(Some(place)).zeros(), zeros);
+        assert_eq!(State::restored(None).zeros(), Zeros::default());
+    }
 
     #[test]
     fn a_corner_is_blended_in_over_its_ticks_or_at_once() {

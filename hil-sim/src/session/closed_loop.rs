@@ -239,6 +239,7 @@ impl Session {
             &self.held.telemetry,
             self.state.confidence(),
             MissedCheckIns::NOBODY,
+            self.state.zeros(),
         )
     }
 

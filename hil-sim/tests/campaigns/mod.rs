@@ -1,5 +1,6 @@
 //! Faults, holds and the stress of plant and controller.
 
+mod accepted;
 mod envelope;
 mod faults;
 mod holds;

@@ -49,8 +49,10 @@ impl Planner {
         let direction = at.direction;
         let lift = self.lift(direction, gap);
         let felt = self.felt_at[direction as usize];
+        // Until the corner is felt nothing moves the pre-tightener.
+        let fastest = self.cruise_speed.min(self.climb_speed);
         let speed_into = |distance, slowest: MillimetresPerSecond| {
-            self.timing.fastest_into(distance, slowest, self.cruise_speed).max(slowest)
+            self.timing.fastest_into(distance, slowest, fastest).max(slowest)
         };
         let ready_from = lift + MEMORY[direction as usize];
         let window_speed = speed_into(felt - FELT_WITHIN - ready_from, at.speed);

@@ -5,10 +5,10 @@ use crate::model::dip::Dip;
 use crate::model::formula::Formula;
 use crate::model::guard::Guard;
 use crate::model::plan::Strategy;
-use crate::model::reduced::ReducedModel;
+use crate::model::reduced::{ReducedModel, Scale};
 use crate::model::timing::Timing;
 use crate::numeric::checked;
-use crate::rig::{REGULATION_PART, Rig, RigError};
+use crate::rig::{Rig, RigError};
 use crate::units::{Direction, Millimetres};
 
 /// Rise and dip of the wheel at which a corner shows its place, mm.
@@ -18,17 +18,8 @@ const DIP_MM: f64 = 1.0;
 /// How much farther the stiffness estimate may rise than fall.
 const STIFFER_RANGE: f64 = 10.0;
 
-/// Part of the pre-tightener's slew that the spring may use up while the wheel climbs.
-const CLIMB_PART: f64 = 0.9;
 /// Reserve below which the crossings do not change it.
 const LEAST_RESERVE: f64 = 1e-3;
-/// Steepest rise of the wheel over a corner, that behind lift-off.
-const LIFT_SLOPE: f64 = 0.5;
-
-/// Part by which the least planned speed exceeds the least useful one: creep of the tread and
-/// the dip under the corner's load take up to a tenth.
-const DIP_PART: f64 = 0.12;
-
 impl Planner {
     /// The scheduler of a rig.
     pub fn try_build(rig: &Rig) -> Result<Self, RigError> {
@@ -64,6 +55,8 @@ impl Planner {
         let gap = |value: f64| checked("control.gap_ref_mm", value);
         let reserve = rig.control.gap_reserve;
         let range = rig.control.adaptation_range;
+        // As far as the model goes.
+        let scale = |to| Ok(Scale::new(checked("control.adaptation_range", to)?).ratio());
         Ok(Self {
             model,
             guard: Guard::try_build(rig)?,
@@ -79,17 +72,9 @@ impl Planner {
                 if reserve > LEAST_RESERVE { 1.0 / reserve } else { 0.0 },
             )?,
             cruise_speed: checked("drive.cruise_speed_mm_s", rig.drive.cruise_speed_mm_s)?,
-            least_speed: checked(
-                "drive.min_crossing_speed_mm_s",
-                rig.drive.min_crossing_speed_mm_s * (1.0 + DIP_PART),
-            )?,
+            least_speed: checked("drive.min_crossing_speed_mm_s", rig.least_planned_speed_mm_s())?,
             safe_speed: checked("control.safe_speed_mm_s", rig.control.safe_speed_mm_s)?,
-            climb_speed: checked(
-                "preload.spring_n_per_mm",
-                (CLIMB_PART * rig.preload.slew_n_per_s
-                    / (rig.preload.spring_n_per_mm * LIFT_SLOPE))
-                    .min(1000.0),
-            )?,
+            climb_speed: checked("preload.spring_n_per_mm", rig.climb_speed_mm_s().min(1000.0))?,
             prescribed_speed: None,
             uniform: false,
             radius: checked("rig.wheel_radius_mm", rig.rig.wheel_radius_mm)?,
@@ -97,16 +82,10 @@ impl Planner {
             tolerance: checked("rig.step_tolerance_mm", rig.rig.step_tolerance_mm)?,
             cruise_preload: checked("preload.cruise_n", rig.preload.cruise_n)?,
             rolling_preload: checked("control.slip_margin", rig.rolling_preload_n())?,
-            most_preload: checked(
-                "preload.limit_n",
-                rig.preload.limit_n * (1.0 - REGULATION_PART),
-            )?,
+            most_preload: checked("preload.limit_n", rig.most_preload_n())?,
             friction: checked("plant.mu", rig.plant.mu)?,
             usable: checked("control.slip_margin", rig.plant.mu - rig.control.slip_margin)?,
-            scale_range: (
-                checked("control.adaptation_range", 1.0 - range)?,
-                checked("control.adaptation_range", 1.0 + STIFFER_RANGE * range)?,
-            ),
+            scale_range: (scale(1.0 - range)?, scale(1.0 + STIFFER_RANGE * range)?),
             gain: checked("control.adaptation_gain", rig.control.adaptation_gain)?,
         })
     }
@@ -173,7 +152,7 @@ mod tests {
             for preload in [plan.cross_preload, plan.cruise_preload] {
                 let preload = preload.to_num::<f64>();
                 prop_assert!(preload >= rig.preload.cruise_n - 1e-3);
-                prop_assert!(preload <= rig.preload.limit_n * (1.0 - REGULATION_PART) + 1e-3);
+                prop_assert!(preload <= rig.most_preload_n() + 1e-3);
             }
             prop_assert!(plan.brake_distance >= Q16::ZERO && plan.brake_time >= Q16::ZERO);
         }
@@ -202,7 +181,7 @@ mod tests {
                 * (1.0 - rig.control.gap_reserve);
             // At the least speed the limit may not suffice; else the target is met, or
             // undercut where the cruise preload alone does.
-            let floor = speed < rig.drive.min_crossing_speed_mm_s * (1.0 + DIP_PART) + 0.01;
+            let floor = speed < rig.least_planned_speed_mm_s() + 0.01;
             prop_assert!(floor || gap < target * 1.002, "{gap} {target}");
         }
 
@@ -243,7 +222,7 @@ mod tests {
             for step in 0..4 {
                 let preload = planner.plan(&request(false, step, 1.0)).cruise_preload;
                 let expected = match strategy {
-                    Strategy::Limit => rig.preload.limit_n * (1.0 - REGULATION_PART),
+                    Strategy::Limit => rig.most_preload_n(),
                     _ => rig.preload.cruise_n,
                 };
                 assert!((preload.to_num::<f64>() - expected).abs() < 1e-3, "{strategy:?}");

@@ -2,7 +2,7 @@ use proptest::prelude::*;
 
 use super::super::{flash_log, image_checksum};
 use super::*;
-use crate::restart::{DriveSnapshot, MissedCheckIns, PackedSpeed};
+use crate::restart::{DriveSnapshot, MissedCheckIns, PackedSpeed, PackedZeros};
 use crate::units::{Q16, q16};
 
 const BLANK: Page = [0xFF; PAGE_BYTES];
@@ -25,6 +25,7 @@ fn snapshot(tick: u32) -> DriveSnapshot {
         fault: 0,
         missed: MissedCheckIns::NOBODY,
         packed_speed,
+        packed_zeros: PackedZeros::default(),
     }
 }
 
