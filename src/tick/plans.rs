@@ -6,7 +6,7 @@ use crate::estimate::OpenCrossing;
 use crate::fault::{Fault, Limit};
 use crate::model::{Outcome, Plan, PlanRequest};
 use crate::supervise::Mode;
-use crate::units::{Newtons, Seconds, Tick, ticks_to_seconds};
+use crate::units::{Direction, Newtons, Seconds, Tick, ticks_to_seconds};
 
 /// Ticks for which the drive may wait for the preload unreported: a spring that moves with the
 /// wheel takes that long to be followed.
@@ -27,12 +27,11 @@ impl Controller {
             sequence: planning.sequence,
             direction: estimate.direction,
             step: estimate.next_step,
-            scale: planning.scale,
-            unknown: planning.unknown,
-            reserve: planning.reserve,
+            learned: planning.learned,
             preload: tick.sensed.preload_filtered,
             distance: self.estimator.distance(estimate).unwrap_or_default(),
             review: planning.review,
+            slipped: planning.slipped,
         });
     }
 
@@ -56,8 +55,7 @@ impl Controller {
             }
         }
         if let Some(outcome) = plan.outcome.as_ref() {
-            planning.scale = outcome.scale;
-            planning.reserve = outcome.reserve;
+            planning.learned = outcome.learned;
             if outcome.bounded {
                 tick.log(Event::Limit(Limit::AdaptationBounded));
             }
@@ -73,6 +71,11 @@ impl Controller {
             }
         }
         planning.plan = Some(*plan);
+        planning.slipped = None;
+        planning.learned.slips = plan.slips;
+        if plan.short && matches!(state.mode, Mode::Run(Direction::Deploy, _)) {
+            tick.fail(Fault::FrictionShort);
+        }
     }
 
     fn await_answer(&self, state: &mut State, tick: &mut TickContext<'_>) {
@@ -129,7 +132,7 @@ fn record(tick: &mut TickContext<'_>, open: &OpenCrossing, outcome: &Outcome) {
         slip: open.slip.lost,
         lead_time: lead_time(open, point.at),
         slip_margin: outcome.slip_margin,
-        stiffness_scale: outcome.scale,
+        stiffness_scale: outcome.learned.scale,
         limited_by: open.limited_by,
     }));
 }
@@ -149,7 +152,7 @@ mod tests {
     use super::super::tests::{sensed, within};
     use super::*;
     use crate::supervise::Leg;
-    use crate::units::{Direction, q16};
+    use crate::units::q16;
 
     /// In motion on the first wall.
     fn running() -> State {

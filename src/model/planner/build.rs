@@ -1,6 +1,6 @@
 //! From a rig to the planner's machine units, once at start.
 
-use super::Planner;
+use super::{KNOWN_DEVIATION, Planner};
 use crate::model::dip::Dip;
 use crate::model::formula::Formula;
 use crate::model::guard::Guard;
@@ -8,8 +8,8 @@ use crate::model::plan::Strategy;
 use crate::model::reduced::ReducedModel;
 use crate::model::timing::Timing;
 use crate::numeric::checked;
-use crate::rig::{REGULATION_PART, Rig, RigError};
-use crate::units::{Direction, Millimetres};
+use crate::rig::{MAX_STEPS, REGULATION_PART, Rig, RigError};
+use crate::units::{Direction, Millimetres, Ratio};
 
 /// Rise and dip of the wheel at which a corner shows its place, mm.
 const RISE_MM: f64 = 0.16;
@@ -44,13 +44,11 @@ impl Planner {
                 (rig.centre_radius_mm(level) - rig.rig.arm_pivot_radius_mm) / rig.rig.arm_length_mm;
             sine / libm::sqrt(1.0 - sine * sine)
         });
-        let coupling = rig.plant.arm_coupling * load;
-        let mut arm_thrust = heapless::Vec::new();
-        for tangent in tangents {
-            // Never full: as many as steps.
-            let _ = arm_thrust.push(checked("plant.arm_coupling", coupling * tangent)?);
-        }
-        let first = arm_thrust.first().map_or(0.0, |w| w.to_num::<f64>());
+        let tangents = tangents
+            .map(|tangent| checked("rig.arm_length_mm", tangent))
+            .collect::<Result<heapless::Vec<_, MAX_STEPS>, _>>()?;
+        let first = tangents.first().map_or(0.0, |tangent: &Ratio| tangent.to_num::<f64>());
+        let first = rig.plant.arm_coupling * load * first;
         let formula = Formula::new(rig);
         let reference = |direction| {
             if rig.control.gap_ref_mm > 0.0 {
@@ -64,14 +62,18 @@ impl Planner {
         let gap = |value: f64| checked("control.gap_ref_mm", value);
         let reserve = rig.control.gap_reserve;
         let range = rig.control.adaptation_range;
+        // With which a tread as known is corrected by the gain.
+        let known = KNOWN_DEVIATION.to_num::<f64>();
+        let measured = known * known * (1.0 / rig.control.adaptation_gain.max(1e-3) - 1.0);
         Ok(Self {
             model,
             guard: Guard::try_build(rig)?,
             timing: Timing::try_build(rig)?,
             dip: Dip::try_build(rig)?,
             strategy,
-            arm_thrust,
-            coupling: checked("plant.arm_coupling", coupling)?,
+            tangents,
+            coupling: checked("plant.arm_coupling", rig.plant.arm_coupling)?,
+            load: checked("plant.top_load_n", load)?,
             gap_ref: [gap(references[0])?, gap(references[1])?],
             reserve: checked("control.gap_reserve", reserve)?,
             by_reserve: checked(
@@ -107,7 +109,7 @@ impl Planner {
                 checked("control.adaptation_range", 1.0 - range)?,
                 checked("control.adaptation_range", 1.0 + STIFFER_RANGE * range)?,
             ),
-            gain: checked("control.adaptation_gain", rig.control.adaptation_gain)?,
+            measured_variance: checked("control.adaptation_gain", measured)?,
         })
     }
 
