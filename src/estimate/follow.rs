@@ -531,6 +531,7 @@ mod tests {
             now: 0,
             sensed: &sensed,
             pressed: Q16::ZERO,
+            duty: Q16::ZERO,
             most_pressed: false,
             standing_since: None,
             limited_by: None,
