@@ -5,7 +5,7 @@ use interstage::model::formula::Formula;
 use interstage::model::reduced::ReducedModel;
 use interstage::model::{Learned, PlanRequest, Planner};
 use interstage::rig::{Rig, RigError};
-use interstage::units::{Direction, Q16, Ratio};
+use interstage::units::{Direction, Q16};
 
 #[test]
 fn stiffness_times_the_relaxed_force_is_the_force() {

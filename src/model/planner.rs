@@ -60,8 +60,10 @@ const HOLDS_WITHIN: Newtons = q16(100_000);
 /// 0.01 more of it saves one slip in twenty: a run that is stopped and repeated, 10 s.
 const MARGIN_PER_SECOND: Ratio = q16(20_000);
 
-/// By how much the model may read the friction needed too low.
+/// By how much the model may read the friction needed too low; how much more often 0.01 of a margin
+/// that is less saves a slip.
 const READ_LOW: Ratio = q16(60_000);
+const LIKELY_TIMES: Q16 = q16(3_000_000);
 
 /// Difference of the friction needed that is none: a preload counts as reached within 2 %.
 const SAME_NEED: Ratio = q16(5_000);
@@ -345,7 +347,10 @@ impl Planner {
         let speed_at = |gap| self.model.speed(at, gap, carried, floor, ceiling);
         let used = |gap, speed| self.model.utilisation(&Point { speed, ..*at }, gap);
         // Time that the missing margin is worth, and that which the crossing takes, s.
-        let price = |used: Ratio| divide((used - usable).max(Q16::ZERO), MARGIN_PER_SECOND);
+        let price = |used: Ratio| {
+            let likely = (used - (friction - READ_LOW)).max(Q16::ZERO) * LIKELY_TIMES;
+            divide((used - usable).max(Q16::ZERO) + likely, MARGIN_PER_SECOND)
+        };
         let takes = |gap: Millimetres, speed| {
             let approach = self.approach(request, &Point { speed, ..*at }, carried, gap);
             self.travels(request.distance, &approach)

@@ -90,6 +90,7 @@ impl Controller {
         let (slipping, slipped) = state.estimate.slips();
         if slipped {
             targets.preload = most_preload;
+            targets.speed = targets.speed.min(cross_speed);
         }
         self.learn_slip(state, tick);
         if slipping {

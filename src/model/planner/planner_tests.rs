@@ -119,7 +119,7 @@ fn what_grips_may_be_used_and_what_slips_may_not() {
 fn a_slip_is_planned_with_and_one_that_no_choice_avoids_stops() {
     let planner = Planner::try_build(&Rig::prototype()).expect("a sound rig");
     let plan = |slipped: Option<i64>| {
-        let slipped = slipped.map(|force| Newtons::from_num(force));
+        let slipped = slipped.map(Newtons::from_num);
         planner.plan(&PlanRequest { slipped, ..request(Direction::Deploy) })
     };
     let grips = plan(None);
