@@ -390,7 +390,7 @@ fn a_plan_names_what_keeps_the_crossing_from_being_faster() {
     let prototype = |_: &mut Rig| {};
     assert_eq!(named(1.1, &as_it_is, &prototype), LimitedBy::Preload);
     assert_eq!(named(1.1, &from_nothing, &prototype), LimitedBy::Slew);
-    assert_eq!(named(0.75, &as_it_is, &prototype), LimitedBy::Friction);
+    assert_eq!(named(0.82, &as_it_is, &prototype), LimitedBy::Friction);
     let stiff = |request: &mut PlanRequest| request.learned = stiff(q16(3_000_000));
     assert_eq!(named(1.1, &stiff, &prototype), LimitedBy::LeastSpeed);
     let slow_drive = |rig: &mut Rig| {
