@@ -32,6 +32,7 @@ pub use slip::CornerSlip;
 pub use stage::ContactStage;
 pub use state::{EstimateState, Findings, LiftPoint, OpenCrossing, Slip};
 pub use steps::{Expectation, Steps};
+pub use tread::Shown;
 
 use crate::units::{Millimetres, Ratio};
 

@@ -68,11 +68,13 @@ pub enum Fault {
     ArmAngleMagnet = 106,
     /// At the end of travel the position is less certain than the end has to be.
     PlaceUnconfirmed = 135,
+    /// The friction is below what the load needs at the step ahead.
+    FrictionShort = 136,
 }
 
 impl Fault {
     /// Every fault, in the order of codes.
-    pub const ALL: [Self; 30] = [
+    pub const ALL: [Self; 31] = [
         Self::WheelEncoderStale,
         Self::PreloadSensorStale,
         Self::CompressionSensorStale,
@@ -99,6 +101,7 @@ impl Fault {
         Self::WheelSlips,
         Self::PositionUnknown,
         Self::PlaceUnconfirmed,
+        Self::FrictionShort,
         Self::ModelSilent,
         Self::SelfTest,
         Self::EmergencyStop,
@@ -148,6 +151,9 @@ impl Fault {
             }
             Self::PlaceUnconfirmed => {
                 "place unconfirmed: the end of travel is reached by a position that no step bears out"
+            }
+            Self::FrictionShort => {
+                "friction below what this load needs: even the crossing that asks least of it slips"
             }
             Self::ModelSilent => "the model task does not answer",
             Self::EmergencyStop => "the emergency stop cut the bridges",

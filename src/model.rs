@@ -12,5 +12,5 @@ pub mod planner;
 pub mod reduced;
 pub mod timing;
 
-pub use plan::{Approach, LimitedBy, Outcome, Plan, PlanRequest, Review, Strategy};
+pub use plan::{Approach, Learned, LimitedBy, Outcome, Plan, PlanRequest, Review, Strategy};
 pub use planner::Planner;

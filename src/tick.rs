@@ -98,8 +98,8 @@ pub struct Controller {
     preload_latency: Seconds,
     /// Axial load on this wheel, N.
     load: Newtons,
-    /// Radial force per tangent of the arm angle: coupling times axial load, N.
-    arm_thrust_max: Newtons,
+    /// Radial force that the arm's inclination adds, per load and tangent of its angle.
+    arm_coupling: Ratio,
     /// Inertia of rotor, gears and carriage at the tread, N s^2/mm.
     inertia: Q16,
     friction: Ratio,
@@ -141,6 +141,11 @@ impl TickContext<'_> {
 }
 
 impl Controller {
+    /// Axial load on this wheel as learned, N.
+    fn load_of(&self, state: &State) -> Newtons {
+        self.load + state.planning.learned.extra_load
+    }
+
     /// Travel of the wheel over a corner, mm.
     pub const fn corner_reach(&self) -> Millimetres {
         self.estimator.steps().corner_reach()
@@ -163,7 +168,7 @@ impl Controller {
         let acceleration = state.acceleration();
         let sensed = self.senses.step(&mut state.senses, input.now, &input.sensors, acceleration);
         self.estimator.begin_tick(&mut state.estimate, &sensed);
-        let arm_thrust = self.arm_thrust_max * sensed.tan_arm;
+        let arm_thrust = self.arm_coupling * self.load_of(state) * sensed.tan_arm;
         let tick =
             &mut TickContext { now: input.now, sensed: &sensed, arm_thrust, trigger: None, output };
         self.take_plan(state, tick, input.plan.as_ref());
@@ -239,6 +244,7 @@ impl Controller {
             now: tick.now,
             sensed: tick.sensed,
             pressed,
+            duty: state.speed_loop.duty(),
             most_pressed: short <= self.schedule.reached_within(),
             standing_since,
             limited_by,

@@ -3,9 +3,9 @@
 use interstage::model::effective_stiffness::Kind;
 use interstage::model::formula::Formula;
 use interstage::model::reduced::ReducedModel;
-use interstage::model::{PlanRequest, Planner};
+use interstage::model::{Learned, PlanRequest, Planner};
 use interstage::rig::{Rig, RigError};
-use interstage::units::{Direction, Q16, Ratio};
+use interstage::units::{Direction, Q16};
 
 #[test]
 fn stiffness_times_the_relaxed_force_is_the_force() {
@@ -47,12 +47,11 @@ fn a_prescribed_speed_is_planned() {
         sequence: 1,
         direction: Direction::Deploy,
         step: 1,
-        scale: Ratio::from_num(1),
-        unknown: false,
-        reserve: Q16::ONE,
+        learned: Learned::default(),
         preload: Q16::from_num(50),
         distance: Q16::from_num(4),
         review: None,
+        slipped: None,
     };
     let planner = || Planner::try_build(&Rig::prototype()).unwrap();
     let plan = |uniform| planner().with_speed(6.0, uniform).unwrap().plan(&request);

@@ -5,7 +5,7 @@ use embassy_time::Duration;
 use interstage::fault::Fault;
 use interstage::hal::Light;
 use interstage::log::{Identity, LogEncoder};
-use interstage::model::{PlanRequest, Planner};
+use interstage::model::{Learned, PlanRequest, Planner};
 use interstage::rig::Rig;
 use interstage::supervise::{Command, Mode};
 use interstage::tasks::{self, COMMANDS, ENTRIES, Exchange};
@@ -21,12 +21,11 @@ fn request(sequence: u32) -> PlanRequest {
         sequence,
         direction: Direction::Deploy,
         step: 1,
-        scale: Ratio::from_num(1),
-        unknown: false,
-        reserve: Ratio::ONE,
+        learned: Learned::default(),
         preload: Ratio::from_num(50),
         distance: Ratio::from_num(4),
         review: None,
+        slipped: None,
     }
 }
 

@@ -262,7 +262,7 @@ impl Schedule {
 #[allow(clippy::float_arithmetic, reason = "the reference is in f64")]
 mod tests {
     use super::*;
-    use crate::model::{PlanRequest, Planner};
+    use crate::model::{Learned, PlanRequest, Planner};
     use proptest::prelude::*;
 
     fn setting(back: bool) -> (Rig, Schedule, Steps, Plan) {
@@ -272,12 +272,11 @@ mod tests {
             sequence: 1,
             direction,
             step: 2,
-            scale: q16(1_000_000),
-            unknown: false,
-            reserve: Q16::ONE,
+            learned: Learned::default(),
             preload: Q16::from_num(50),
             distance: Q16::ZERO,
             review: None,
+            slipped: None,
         });
         (rig.clone(), Schedule::try_build(&rig).unwrap(), Steps::try_build(&rig).unwrap(), plan)
     }

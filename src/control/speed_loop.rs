@@ -37,10 +37,11 @@ pub struct SpeedLoop {
     integral: Q16,
 }
 
-/// The integral part, duty, Q31.32.
+/// The integral part, duty, Q31.32, and the last duty.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SpeedLoopState {
     integral: Travel,
+    duty: Ratio,
 }
 
 impl SpeedLoop {
@@ -98,6 +99,7 @@ impl SpeedLoop {
                 .saturating_add(per_tick(self.integral * error.clamp(-MOST_ERROR, MOST_ERROR)))
                 .clamp(-limit, limit);
         }
+        state.duty = whole.clamp(-FULL, FULL);
         Duty::saturating(whole)
     }
 }
@@ -105,7 +107,12 @@ impl SpeedLoop {
 impl SpeedLoopState {
     /// Forgets the integral part.
     pub fn reset(&mut self) {
-        self.integral = Travel::ZERO;
+        *self = Self::default();
+    }
+
+    /// Duty of the last tick.
+    pub const fn duty(&self) -> Ratio {
+        self.duty
     }
 
     /// Duty that it adds to the feed-forward.

@@ -4,14 +4,14 @@ use super::crossing::{Contact, CrossingEvent, Lift, WatchInput};
 use super::landing::OnEdge;
 use super::odometry::Rolling;
 use super::restore::UNSURE_WITHIN;
-use super::tread::Shown;
+use super::tread::Rolls;
 use super::{
     EstimateState, Estimator, Expectation, Findings, LiftPoint, OpenCrossing, Position, Slip,
 };
 use crate::fault::{Fault, Limit};
 use crate::model::LimitedBy;
 use crate::sense::{FILTER_LAG, SensedState};
-use crate::units::{Direction, Millimetres, Newtons, Q16, Tick, q16};
+use crate::units::{Direction, Millimetres, Newtons, Q16, Ratio, Tick, q16};
 
 /// Ticks for which a wheel may slip under the most preload that there is: five times those in which
 /// the published tread relaxes.
@@ -29,6 +29,8 @@ pub struct Follow<'a> {
     pub sensed: &'a SensedState,
     /// Radial force on the wheel, N.
     pub pressed: Newtons,
+    /// Duty of the drive in the last tick.
+    pub duty: Ratio,
     /// The preload is as high as it may be.
     pub most_pressed: bool,
     /// Since when the crossing preload has been reached.
@@ -90,9 +92,9 @@ impl Estimator {
         self.hold_to_corner(state, tick.sensed);
         if state.watch.contact == Contact::Wall && !state.known.is_searching() {
             let (travel, compression) = (tick.sensed.travel, tick.sensed.compression_filtered);
-            let tread = &mut state.tread;
-            let shown = self.tread.roll(tread, direction, travel, tick.pressed, compression);
-            found.stiffness = shown.map(Shown::stiffness);
+            let (speed, duty, pressed) = (tick.sensed.speed.value, tick.duty, tick.pressed);
+            let rolls = Rolls { direction, travel, speed, duty, pressed, compression };
+            found.shown = self.tread.roll(&mut state.tread, &rolls);
         }
         found
     }
@@ -582,6 +584,7 @@ mod tests {
             now: 0,
             sensed: &sensed,
             pressed: Q16::ZERO,
+            duty: Q16::ZERO,
             most_pressed: false,
             standing_since: None,
             limited_by: None,

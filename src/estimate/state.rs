@@ -4,7 +4,7 @@ use super::crossing::{Contact, WatchState};
 use super::landing::{Landing, Slide};
 use super::crossing_speed::CrossingSpeed;
 use super::odometry::Odometry;
-use super::tread::TreadState;
+use super::tread::{Shown, TreadState};
 use super::{CornerSlip, Place, Position, PositionConfidence};
 use crate::fault::{Fault, Limit};
 use crate::model::LimitedBy;
@@ -151,8 +151,8 @@ pub struct Findings {
     pub advanced: bool,
     /// A crossing that was observed from touch to end, and whether its gap is plausible.
     pub closed: Option<(OpenCrossing, bool)>,
-    /// Stiffness to expect of the first crossing, over the known one.
-    pub stiffness: Option<Ratio>,
+    /// What tread and drive show before the first crossing.
+    pub shown: Option<Shown>,
     /// A new plan is needed.
     pub replan: bool,
 }

@@ -14,7 +14,10 @@
 use crate::model::corner_profile::CornerProfile;
 use crate::numeric::{LowPass, LowPassState, checked, divide, sqrt};
 use crate::rig::{Rig, RigError};
-use crate::units::{Direction, Millimetres, Newtons, Q16, Ratio, Travel, q16};
+use crate::units::{
+    Direction, Millimetres, MillimetresPerSecond, Newtons, Q16, Ratio, Travel, q16,
+    ticks_to_seconds,
+};
 
 /// Part of the load that the compression may show too much or too little. Rubber that is off
 /// by three deviations of 4 % makes 0.13, gains of both sensors 0.03, the noise of what they
@@ -50,6 +53,12 @@ const SPACING: f64 = 1.0 / 40.0;
 const AHEAD: usize = 19;
 /// Where the rolling tread is observed, over the wheel's radius.
 const ROLLING: [f64; 2] = [0.03, 0.12];
+/// Coulomb friction of the gearbox, and one sigma of the load that the drive shows, as parts of the
+/// stall force: friction of the gearbox to a tenth, supply of the bridge to 0.6 %, rolling loss of
+/// a tread as far from the known one as the random rigs'.
+const GEARBOX: f64 = 0.02;
+const LOAD_SIGMA: f64 = 0.005;
+
 /// A sum counts 1/256 of its terms, so that a second of 1,000 N fits.
 const LONGEST: u16 = 4096;
 
@@ -71,6 +80,14 @@ pub struct Tread {
     rolling: (Millimetres, Millimetres),
     /// Least preload at which it is compared, N.
     least: Newtons,
+    /// Force of the drive at full duty, N, its friction, and one sigma of the load that it shows.
+    stall: Newtons,
+    gearbox: Newtons,
+    load_sigma: Newtons,
+    /// Duty per speed, s/mm.
+    per_speed: Q16,
+    /// Rotor, gears and carriage at the tread, N s^2/mm.
+    inertia: Q16,
 }
 
 /// State of a [`Tread`].
@@ -86,6 +103,18 @@ pub struct TreadState {
     from: Travel,
     rest: Sums,
     rolled: Sums,
+    drive: DriveSums,
+}
+
+/// What the drive does while the wheel rolls.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct DriveSums {
+    /// Travel along the run and speed at its beginning.
+    from: Option<(Millimetres, MillimetresPerSecond)>,
+    ticks: u16,
+    duty: Ratio,
+    /// Rolling resistance that the compression means, 1/256 N.
+    resistance: Newtons,
 }
 
 /// Sums of the loads measured and meant, 1/256 N.
@@ -110,25 +139,49 @@ impl Sums {
     }
 }
 
-/// Load measured over the load that the compression means.
+/// A tick of a wheel that rolls on a wall.
+#[derive(Clone, Copy, Debug)]
+pub struct Rolls {
+    /// Direction of the run.
+    pub direction: Direction,
+    /// Travel outwards.
+    pub travel: Travel,
+    /// Speed outwards, mm/s.
+    pub speed: MillimetresPerSecond,
+    /// Duty of the drive, outwards.
+    pub duty: Ratio,
+    /// Radial force on the wheel, N.
+    pub pressed: Newtons,
+    /// Compression of the tread, mm.
+    pub compression: Millimetres,
+}
+
+/// What tread and drive show before the first crossing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Shown {
-    /// Of the wheel at rest.
+    /// Load measured over the load that the compression means, of the wheel at rest.
     pub rest: Ratio,
     /// Of the rolling wheel.
     pub rolled: Ratio,
+    /// Radial force on the rolling wheel as known so far, N.
+    pub pressed: Newtons,
+    /// Axial load by the drive's effort, N; none on retract, where the worm holds it.
+    pub load: Option<Newtons>,
+    /// One sigma of it, N.
+    pub load_sigma: Newtons,
 }
 
 impl Shown {
     /// Stiffness to expect of the first crossing, over the known one; 1 while nothing speaks
-    /// against that.
-    pub fn stiffness(self) -> Ratio {
-        let beyond = divide(self.rest, self.rolled) - RATIO_WITHIN;
+    /// against that. The arm presses the wheel by `thrust`, N, more than was known.
+    pub fn stiffness(self, thrust: Newtons) -> Ratio {
+        let rolled = self.rolled + divide(self.rolled * thrust, self.pressed);
+        let beyond = divide(self.rest, rolled) - RATIO_WITHIN;
         let coupled = Ratio::ONE + beyond.max(Q16::ZERO) * PER_RATIO;
-        if self.rolled < SOFT {
-            coupled.max(SOFT_AS + SOFT - self.rolled)
-        } else if self.rolled > STIFF {
-            coupled.max(self.rolled)
+        if rolled < SOFT {
+            coupled.max(SOFT_AS + SOFT - rolled)
+        } else if rolled > STIFF {
+            coupled.max(rolled)
         } else {
             coupled
         }
@@ -164,6 +217,14 @@ impl Tread {
             curvature: length(0.5 / radius)?,
             rolling: (length(from)?, length(to)?),
             least: checked("preload.cruise_n", LEAST_PART * rig.preload.cruise_n)?,
+            stall: checked("drive.stall_force_n", rig.drive.stall_force_n)?,
+            gearbox: checked("drive.stall_force_n", GEARBOX * rig.drive.stall_force_n)?,
+            load_sigma: checked("drive.stall_force_n", LOAD_SIGMA * rig.drive.stall_force_n)?,
+            per_speed: checked("drive.no_load_speed_mm_s", 1.0 / rig.drive.no_load_speed_mm_s)?,
+            inertia: checked(
+                "drive.reflected_mass_kg",
+                1e-3 * (rig.drive.reflected_mass_kg + rig.plant.moved_mass_kg),
+            )?,
         })
     }
 
@@ -203,7 +264,7 @@ impl Tread {
         arm_thrust: Newtons,
         compression: Millimetres,
     ) -> bool {
-        let meant = self.load(state, Q16::ZERO, compression);
+        let (meant, _) = self.load(state, Q16::ZERO, compression);
         state.ticks = state.ticks.saturating_add(1);
         if state.ticks < FORGETS || preload < self.least {
             return false;
@@ -215,61 +276,87 @@ impl Tread {
         state.off == OFF_TICKS
     }
 
-    /// A tick of a wheel that rolls on a wall under this radial force, N. Once, where enough has
-    /// been seen, the tread at rest and rolling.
+    /// A tick of a wheel that rolls on a wall. Once, where enough has been seen, the tread at rest
+    /// and rolling, and the load.
     /// None while the wheel is too close to where it was at rest, or too far away, or if its
     /// preload did not rise there.
-    pub fn roll(
-        &self,
-        state: &mut TreadState,
-        direction: Direction,
-        travel: Travel,
-        pressed: Newtons,
-        compression: Millimetres,
-    ) -> Option<Shown> {
+    pub fn roll(&self, state: &mut TreadState, tick: &Rolls) -> Option<Shown> {
         if !state.rises {
             return None;
         }
-        let rolled = match direction {
-            Direction::Deploy => Q16::narrow(travel - state.from),
-            Direction::Retract => Q16::narrow(state.from - travel),
+        let rolled = match tick.direction {
+            Direction::Deploy => Q16::narrow(tick.travel - state.from),
+            Direction::Retract => Q16::narrow(state.from - tick.travel),
         };
-        let meant = self.load(state, rolled, compression);
+        let (meant, resistance) = self.load(state, rolled, tick.compression);
         let (from, to) = self.rolling;
-        if rolled > from && pressed > self.least {
-            state.rolled.add(pressed, meant);
+        if rolled > from && tick.pressed > self.least {
+            state.rolled.add(tick.pressed, meant);
+            let drive = &mut state.drive;
+            if drive.from.is_none() {
+                drive.from = Some((rolled, tick.speed));
+            } else if drive.ticks < LONGEST {
+                drive.ticks += 1;
+                drive.duty += tick.duty;
+                drive.resistance += Q16::from_bits(resistance.to_bits() >> 8);
+            }
         }
         if rolled <= to {
             return None;
         }
         state.rises = false;
         let seen = state.rest.ticks > OFF_TICKS && state.rolled.ticks > OFF_TICKS;
-        seen.then(|| Shown { rest: state.rest.ratio(), rolled: state.rolled.ratio() })
+        let ticks = Q16::from_bits(i32::from(state.rolled.ticks) << 8);
+        seen.then(|| Shown {
+            rest: state.rest.ratio(),
+            rolled: state.rolled.ratio(),
+            pressed: divide(state.rolled.measured, ticks),
+            load: self.axial(&state.drive, rolled, tick),
+            load_sigma: self.load_sigma,
+        })
+    }
+
+    /// Axial load, N, by the drive's mean effort since it is watched: what its duty is beyond that of
+    /// its speed, less acceleration, friction of the gearbox and rolling resistance.
+    fn axial(&self, drive: &DriveSums, rolled: Millimetres, tick: &Rolls) -> Option<Newtons> {
+        let (from, speed) = drive.from.filter(|_| tick.direction == Direction::Deploy)?;
+        let ticks = Q16::from_num(drive.ticks);
+        let seconds = ticks_to_seconds(u32::from(drive.ticks));
+        let duty = divide(drive.duty, ticks) - divide(rolled - from, seconds) * self.per_speed;
+        let accelerates = self.inertia * divide(tick.speed - speed, seconds);
+        let resistance = divide(drive.resistance, Q16::from_bits(ticks.to_bits() >> 8));
+        Some(self.stall * duty - accelerates - self.gearbox - resistance)
     }
 
     /// Depth of an element, mm.
     fn depth(&self, index: usize, rolled: Millimetres, compression: Millimetres) -> Millimetres {
-        let place = self.spacing * Q16::from_num(index as i32 + AHEAD as i32 - ELEMENTS as i32 + 1);
-        let x = place - rolled;
+        let x = self.place(index) - rolled;
         (compression - x * x * self.curvature).max(Q16::ZERO)
     }
 
-    /// Load that the compression means, N; the memory moves on by a tick.
+    /// Place of an element ahead of where the wheel was at rest, mm.
+    fn place(&self, index: usize) -> Millimetres {
+        self.spacing * Q16::from_num(index as i32 + AHEAD as i32 - ELEMENTS as i32 + 1)
+    }
+
+    /// Load and rolling resistance that the compression means, N; the memory moves on by a tick.
     fn load(
         &self,
         state: &mut TreadState,
         rolled: Millimetres,
         compression: Millimetres,
-    ) -> Newtons {
-        let mut sum = Q16::ZERO;
+    ) -> (Newtons, Newtons) {
+        let (mut sum, mut moment) = (Q16::ZERO, Q16::ZERO);
         for (index, q) in state.q.iter_mut().enumerate() {
             let depth = self.depth(index, rolled, compression);
             if depth > Q16::ZERO {
-                sum += (depth + (depth - q.output()) * self.excess).max(Q16::ZERO);
+                let part = (depth + (depth - q.output()) * self.excess).max(Q16::ZERO);
+                sum += part;
+                moment += part * (self.place(index) - rolled);
             }
             self.memory.step(q, depth);
         }
-        sum * self.rate
+        (sum * self.rate, (moment + moment) * self.curvature * self.rate)
     }
 }
 
@@ -283,6 +370,11 @@ mod tests {
     fn stiffness(rig: &Rig) -> f64 {
         let area = 1e-9 * rig.tread.k_inf_pa_per_m * rig.rig.wheel_width_mm;
         4.0 / 3.0 * area * (2.0 * rig.rig.wheel_radius_mm).sqrt()
+    }
+
+    /// A tick of a wheel whose drive does nothing.
+    fn rolling(direction: Direction, travel: Travel, pressed: Q16, compression: Q16) -> Rolls {
+        Rolls { direction, travel, speed: Q16::ZERO, duty: Q16::ZERO, pressed, compression }
     }
 
     /// A state that began with the wheel unloaded.
@@ -364,11 +456,15 @@ mod tests {
                     tread.rest(&mut state, load, Q16::ZERO, shown);
                     None
                 }
-                Direction::Deploy => tread.roll(&mut state, direction, outwards, load, shown),
-                Direction::Retract => tread.roll(&mut state, direction, -outwards, load, shown),
+                Direction::Deploy => {
+                    tread.roll(&mut state, &rolling(direction, outwards, load, shown))
+                }
+                Direction::Retract => {
+                    tread.roll(&mut state, &rolling(direction, -outwards, load, shown))
+                }
             };
             if let Some(shown_now) = ratio {
-                let again = tread.roll(&mut state, direction, outwards, load, shown);
+                let again = tread.roll(&mut state, &rolling(direction, outwards, load, shown));
                 assert_eq!(again, None, "once");
                 return Some(divide(shown_now.rest, shown_now.rolled).to_num());
             }
@@ -403,9 +499,15 @@ mod tests {
             rolled in 0.4..1.3f64,
             ratio in 0.95..1.25f64,
         ) {
-            let shown =
-                Shown { rest: Q16::from_num(rolled * ratio), rolled: Q16::from_num(rolled) };
-            let got: f64 = shown.stiffness().to_num();
+            // An arm that presses by a quarter more than was known leaves four fifths of it.
+            let shown = Shown {
+                rest: Q16::from_num(rolled * ratio),
+                rolled: Q16::from_num(0.8 * rolled),
+                pressed: q16(40_000_000),
+                load: None,
+                load_sigma: Q16::ONE,
+            };
+            let got: f64 = shown.stiffness(q16(10_000_000)).to_num();
             let coupled = 1.0 + 4.0 * (ratio - 1.03).max(0.0);
             let exact = match rolled {
                 r if r < 0.9 => coupled.max(1.16 + 0.9 - r),
@@ -427,7 +529,8 @@ mod tests {
         }
         for tick in 0..1000 {
             let travel = Travel::from_num(0.01 * f64::from(tick));
-            assert_eq!(tread.roll(&mut state, Direction::Deploy, travel, load, compression), None);
+            let rolls = rolling(Direction::Deploy, travel, load, compression);
+            assert_eq!(tread.roll(&mut state, &rolls), None);
         }
     }
 
@@ -475,9 +578,47 @@ mod tests {
             let mut state = TreadState::default();
             let shown = Q16::from_num(compression);
             tread.begin(&mut state, Travel::ZERO, Q16::ZERO, shown);
-            let load = tread.load(&mut state, Q16::ZERO, shown).to_num::<f64>();
+            let load = tread.load(&mut state, Q16::ZERO, shown).0.to_num::<f64>();
             let exact = stiffness(&rig) * compression.powf(1.5);
             prop_assert!((load / exact - 1.0).abs() < 0.04, "{load} {exact}");
+        }
+    }
+
+    proptest! {
+        /// A wheel that speeds up against this load; no rolling resistance without compression.
+        #[test]
+        fn the_load_is_what_the_duty_is_beyond_speed_acceleration_and_gearbox(
+            load in 0.0..20.0f64,
+            speeds_up in 0.0..200.0f64,
+            supply in 0.994..1.006f64,
+        ) {
+            for rig in [Rig::prototype(), Rig::fe()] {
+                let tread = Tread::try_build(&rig).expect("in range");
+                let mut state = begun(&tread);
+                let pressed = q16(80_000_000);
+                for _ in 0..u32::from(FORGETS + 2 * OFF_TICKS) {
+                    tread.rest(&mut state, pressed, Q16::ZERO, Q16::ZERO);
+                }
+                let (mut travel, mut speed) = (0.0, 8.0);
+                let mass = 1e-3 * (rig.drive.reflected_mass_kg + rig.plant.moved_mass_kg);
+                let shown = (0..2000).find_map(|_| {
+                    speed += 1e-3 * speeds_up;
+                    travel += 1e-3 * speed;
+                    let force = load + mass * speeds_up + GEARBOX * rig.drive.stall_force_n;
+                    let duty = speed / rig.drive.no_load_speed_mm_s
+                        + force / rig.drive.stall_force_n;
+                    let rolls = Rolls {
+                        speed: Q16::from_num(speed),
+                        duty: Q16::from_num(duty / supply),
+                        ..rolling(Direction::Deploy, Travel::from_num(travel), pressed, Q16::ZERO)
+                    };
+                    tread.roll(&mut state, &rolls)
+                });
+                let shown = shown.expect("seen");
+                let got = shown.load.expect("shows on the way out").to_num::<f64>();
+                let sigma = shown.load_sigma.to_num::<f64>();
+                prop_assert!((got - load).abs() < 1.5 * sigma, "{got} of {load}, {sigma}");
+            }
         }
     }
 

@@ -135,7 +135,7 @@ mod tests {
     use super::super::ledger::tests::crossing;
     use super::*;
     use crate::fault::Limit;
-    use crate::model::{Approach, LimitedBy, Outcome, Plan, PlanRequest, Review};
+    use crate::model::{Approach, Learned, LimitedBy, Outcome, Plan, PlanRequest, Review};
     use crate::supervise::Mode;
     use crate::tick::CrossingRecord;
 
@@ -270,24 +270,32 @@ mod tests {
             gap: most,
             seen: most,
             trusted: true,
+            slipped: true,
+        };
+        let learned = Learned {
+            scale: most,
+            deviation: most,
+            unknown: true,
+            reserve: most,
+            extra_load: most,
+            grips: most,
+            slips: most,
         };
         let direction = Direction::Retract;
         let request = PlanRequest {
             sequence: u32::MAX,
             direction,
             step: 255,
-            scale: most,
-            unknown: false,
-            reserve: Q16::ONE,
+            learned,
             preload: most,
             distance: most,
             review: Some(review),
+            slipped: Some(most),
         };
         let outcome = Outcome {
             gap_predicted: most,
             slip_margin: most,
-            scale: most,
-            reserve: most,
+            learned,
             bounded: true,
             strange: true,
             wide: true,
@@ -302,6 +310,8 @@ mod tests {
             cross_preload: most,
             gap: most,
             slip_margin: most,
+            slips: most,
+            short: true,
             brake_distance: most,
             brake_time: most,
             approach: Approach {

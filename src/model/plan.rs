@@ -73,6 +73,43 @@ pub struct Review {
     pub seen: Millimetres,
     /// Whether the gap may correct the stiffness: not after an odd crossing.
     pub trusted: bool,
+    /// The wheel slipped on the corner.
+    pub slipped: bool,
+}
+
+/// What the runs so far have shown of tread, load and friction.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Learned {
+    /// Estimated over nominal stiffness of the tread.
+    pub scale: Ratio,
+    /// One sigma of its logarithm.
+    pub deviation: Ratio,
+    /// The tread has shown before the first crossing that it is not as known.
+    pub unknown: bool,
+    /// Share of the rig's reserve below the reference gap.
+    pub reserve: Ratio,
+    /// Axial load on this wheel beyond that of the rig, N; 0 until the drive has shown another.
+    pub extra_load: Newtons,
+    /// Largest utilisation of friction, by the model, that has gripped: a lower bound of the
+    /// friction.
+    pub grips: Ratio,
+    /// Least that has slipped: an upper bound.
+    pub slips: Ratio,
+}
+
+impl Default for Learned {
+    /// Of a rig that has not run.
+    fn default() -> Self {
+        Self {
+            scale: Ratio::ONE,
+            deviation: super::planner::KNOWN_DEVIATION,
+            unknown: false,
+            reserve: Ratio::ONE,
+            extra_load: Newtons::ZERO,
+            grips: Ratio::ZERO,
+            slips: Ratio::MAX,
+        }
+    }
 }
 
 /// Request for the schedule of the step ahead, and first for the review of the step behind.
@@ -84,18 +121,16 @@ pub struct PlanRequest {
     pub direction: Direction,
     /// Step ahead, from 1 at the outermost sleeve; 0 when none is left.
     pub step: u8,
-    /// Estimated over nominal stiffness.
-    pub scale: Ratio,
-    /// The tread has shown before the first crossing that it is not as known.
-    pub unknown: bool,
-    /// Share of the rig's reserve below the reference gap.
-    pub reserve: Ratio,
+    /// Tread, load and friction as learned so far.
+    pub learned: Learned,
     /// Measured preload, N.
     pub preload: Newtons,
     /// Axial distance along the run to the face of the step, mm.
     pub distance: Millimetres,
     /// The crossing just closed.
     pub review: Option<Review>,
+    /// Radial force under which the wheel slips on the corner, N.
+    pub slipped: Option<Newtons>,
 }
 
 /// Result of a review.
@@ -105,11 +140,9 @@ pub struct Outcome {
     pub gap_predicted: Millimetres,
     /// Friction left unused at that point.
     pub slip_margin: Ratio,
-    /// Corrected stiffness scale.
-    pub scale: Ratio,
-    /// Share of the reserve that is kept from now on: half of the last one, and what this
-    /// crossing missed its prediction by.
-    pub reserve: Ratio,
+    /// What is learned with this crossing. Of the reserve half of the last share is kept, and
+    /// what this crossing missed its prediction by.
+    pub learned: Learned,
     /// Whether the correction reached the end of its range.
     pub bounded: bool,
     /// Whether the measured gap implies a stiffness far from the estimated one.
@@ -166,8 +199,12 @@ pub struct Plan {
     pub most_preload: Newtons,
     /// Gap that this gives, mm.
     pub gap: Millimetres,
-    /// Friction left unused at the step.
+    /// Friction left unused at the step, by what is learned of it.
     pub slip_margin: Ratio,
+    /// Least utilisation of friction that has slipped, with the slip of the request.
+    pub slips: Ratio,
+    /// Even the choice that needs least of the friction has slipped.
+    pub short: bool,
     /// Braking distance from cruise to the slowest speed, mm.
     pub brake_distance: Millimetres,
     /// Time that this braking takes, s.

@@ -10,30 +10,27 @@ pub use approach::KNOWN_SCALE;
 
 use super::dip::Dip;
 use super::guard::Guard;
-use super::plan::{Approach, LimitedBy, Outcome, Plan, PlanRequest, Review, Strategy};
+use super::plan::{Approach, Learned, LimitedBy, Outcome, Plan, PlanRequest, Review, Strategy};
 use super::reduced::{Point, ReducedModel, Scale};
 use super::timing::Timing;
 use crate::fault::Limit;
-use crate::numeric::divide;
+use crate::numeric::{between, divide, sqrt};
 use crate::rig::MAX_STEPS;
 use crate::units::{
     Direction, Millimetres, MillimetresPerSecond, Newtons, Q16, Ratio, Seconds, q16,
 };
 
-/// Largest correction of the stiffness scale by one crossing, and that towards a stiffer tread,
-/// which only makes the crossings slower.
-const LARGEST_CORRECTION: Ratio = q16(100_000);
-const LARGEST_STIFFER: Ratio = q16(1_000_000);
+/// One sigma of the logarithm of the stiffness of a tread as known: stiffness 4 %, stiffening 3 %
+/// and relaxation time 5 % off.
+pub const KNOWN_DEVIATION: Ratio = q16(50_000);
+/// The same of what the tread shows before the first crossing if it is not as known.
+pub const SHOWN_DEVIATION: Ratio = q16(240_000);
+/// Variance of a measured stiffness of a tread that is not as known, 0.2 squared: at the next speed
+/// its gap is another by 5 to 6 %, its stiffness by three to four times that.
+const UNKNOWN_VARIANCE: Ratio = q16(40_000);
+/// A measured stiffness further off than so many sigmas, squared, contradicts what is known.
+const SURPRISE: Q16 = q16(9_000_000);
 
-/// Correction towards a stiffer tread above which it is no noise, and the gain that it then has
-/// at least.
-const SURE: Ratio = q16(200_000);
-const SURE_GAIN: Ratio = q16(800_000);
-
-/// Relative difference of a softer and of a stiffer observed stiffness above which it is
-/// rejected: too stiff a guess only costs time.
-const OUTLIER: Ratio = q16(350_000);
-const OUTLIER_STIFFER: Ratio = q16(2_500_000);
 /// Relative difference of an observed stiffness above which it is reported. Rubber that is off
 /// by three deviations makes 0.12 at the first crossing; the rest is the measurement, where a
 /// stiff guess costs most. One in a hundred random rigs exceeds it at one of its crossings.
@@ -58,9 +55,21 @@ const BUILDING: Ratio = q16(900_000);
 /// Error of the model's inverse, N.
 const HOLDS_WITHIN: Newtons = q16(100_000);
 
-/// Speed below which less of it no longer saves friction worth the time, mm/s: about the least
-/// crossing speed of a wheel that dips.
-const LEAST_FOR_GRIP: MillimetresPerSecond = q16(2_000_000);
+/// Friction margin that a second is worth, 1/s: 0.01 for half a second. With the need read up to
+/// 0.06 too low and the friction known to 3 %, a margin of 0.05 is short in one crossing of ten, and
+/// 0.01 more of it saves one slip in twenty: a run that is stopped and repeated, 10 s.
+const MARGIN_PER_SECOND: Ratio = q16(20_000);
+
+/// By how much the model may read the friction needed too low; how much more often 0.01 of a margin
+/// that is less saves a slip.
+const READ_LOW: Ratio = q16(60_000);
+const LIKELY_TIMES: Q16 = q16(3_000_000);
+
+/// Difference of the friction needed that is none: a preload counts as reached within 2 %.
+const SAME_NEED: Ratio = q16(5_000);
+
+/// Smaller gap that is compared, as a part.
+const SMALLER: Ratio = q16(980_000);
 
 /// Halvings by which the gap is found that leaves the slip margin: to 0.4 % of it, which is 3 % of
 /// the speed.
@@ -75,10 +84,12 @@ pub struct Planner {
     timing: Timing,
     dip: Dip,
     strategy: Strategy,
-    /// Radial force that the arm's inclination adds at each step, N.
-    arm_thrust: heapless::Vec<Newtons, MAX_STEPS>,
-    /// Coupling times load: arm thrust per tangent of the arm angle, N.
-    coupling: Newtons,
+    /// Tangent of the arm angle at each step.
+    tangents: heapless::Vec<Ratio, MAX_STEPS>,
+    /// Radial force that the arm's inclination adds, per load and tangent.
+    coupling: Ratio,
+    /// Axial load on this wheel as known, N.
+    load: Newtons,
     /// Gap to hold, deploy and retract, mm.
     gap_ref: [Millimetres; 2],
     /// Part by which the gap aimed at is below it while no crossing has shown what the tread
@@ -109,17 +120,25 @@ pub struct Planner {
     /// The part of it that may be used.
     usable: Ratio,
     scale_range: (Ratio, Ratio),
-    gain: Ratio,
+    /// Variance of the logarithm of a measured stiffness.
+    measured_variance: Ratio,
 }
 
 impl Planner {
     /// Answers a request.
     pub fn plan(&self, request: &PlanRequest) -> Plan {
-        let (softest, stiffest) = self.scale_range;
-        let request = &PlanRequest { scale: request.scale.max(softest).min(stiffest), ..*request };
-        let outcome = request.review.map(|review| self.review(&review, request));
-        let scale = outcome.map_or(request.scale, |o| o.scale);
-        let share = outcome.map_or(request.reserve, |o| o.reserve);
+        let mut learned = request.learned;
+        learned.scale = between(learned.scale, self.scale_range.0, self.scale_range.1);
+        let outcome = request.review.map(|review| self.review(&review, &learned));
+        let mut learned = outcome.map_or(learned, |outcome| outcome.learned);
+        if let Some(force) = request.slipped {
+            let at = Point {
+                extra_load: learned.extra_load,
+                ..Point::nominal(request.direction, self.least_speed)
+            };
+            let used = self.model.crossing(&at, force).utilisation;
+            learned.slips = learned.slips.min(used.max(learned.grips));
+        }
         let (cruise_speed, moved) = self.guard.below(self.cruise_speed);
         let limits = [moved.then_some(Limit::ResonanceAvoided), None, None];
         let mut plan = Plan {
@@ -135,8 +154,10 @@ impl Planner {
                 Strategy::Constant => self.cruise_preload,
                 _ => self.most_preload,
             },
-            gap: self.target(request.direction, share),
+            gap: self.target(request.direction, learned.reserve),
             slip_margin: self.usable,
+            slips: learned.slips,
+            short: false,
             brake_distance: Millimetres::ZERO,
             brake_time: Seconds::ZERO,
             brake_horizon: Millimetres::ZERO,
@@ -152,7 +173,7 @@ impl Planner {
             outcome,
         };
         if request.step > 0 {
-            self.crossing(&PlanRequest { scale, reserve: share, ..*request }, &mut plan);
+            self.crossing(&PlanRequest { learned, ..*request }, &mut plan);
         }
         if self.uniform {
             plan.cruise_speed = plan.cross_speed;
@@ -171,9 +192,10 @@ impl Planner {
         let at = Point {
             direction: request.direction,
             speed: self.least_speed,
-            scale: Scale::new(request.scale),
+            scale: Scale::new(request.learned.scale),
+            extra_load: request.learned.extra_load,
         };
-        let arm_thrust = self.arm_thrust_at(request.step);
+        let arm_thrust = self.arm_thrust_at(request);
         let floor = self.least_speed.min(plan.cruise_speed);
         // No faster than the pre-tightener can follow the spring over the corner.
         let ceiling = plan.cruise_speed.min(self.climb_speed.max(floor));
@@ -192,7 +214,7 @@ impl Planner {
         } else {
             self.limited_by(
                 &choice,
-                self.target(request.direction, request.reserve),
+                self.target(request.direction, request.learned.reserve),
                 (floor, ceiling),
                 plan.most_preload,
             )
@@ -224,8 +246,10 @@ impl Planner {
         let carried = plan.cross_preload.min(most) + arm_thrust;
         let crossing = self.model.crossing(&at, carried);
         plan.gap = crossing.gap;
-        let margin = crossing.slip_margin;
+        let (friction, _) = self.friction_of(&request.learned);
+        let margin = friction - crossing.utilisation;
         plan.slip_margin = margin;
+        plan.short = crossing.utilisation + SAME_NEED >= request.learned.slips;
         if margin < self.friction - self.usable {
             add(&mut plan.limits, Limit::SlipMarginLow);
         }
@@ -296,7 +320,7 @@ impl Planner {
         arm_thrust: Newtons,
         (floor, ceiling): (MillimetresPerSecond, MillimetresPerSecond),
     ) -> Newtons {
-        let gap = self.target(request.direction, request.reserve);
+        let gap = self.target(request.direction, request.learned.reserve);
         let run = self.felt_at[request.direction as usize] - self.lift(request.direction, gap);
         let step = (self.most_preload - self.cruise_preload) * PRELOAD_STEP;
         let preload = |part: u32| self.cruise_preload + step * Q16::from_num(part);
@@ -308,7 +332,7 @@ impl Planner {
     }
 
     /// With this preload: the largest gap up to the target, and the speed with it, that leave
-    /// the slip margin.
+    /// the slip margin, or as much of it as is worth its time.
     fn gripping(
         &self,
         request: &PlanRequest,
@@ -317,25 +341,43 @@ impl Planner {
         arm_thrust: Newtons,
         (floor, ceiling): (MillimetresPerSecond, MillimetresPerSecond),
     ) -> Choice {
-        let target = self.target(request.direction, request.reserve);
+        let target = self.target(request.direction, request.learned.reserve);
         let carried = preload + arm_thrust;
-        let speed_at = |gap, floor| self.model.speed(at, gap, carried, floor, ceiling);
-        let grips =
-            |gap, speed| self.model.utilisation(&Point { speed, ..*at }, gap) <= self.usable;
-        let (mut gap, mut speed) = (target, speed_at(target, floor));
+        let (friction, usable) = self.friction_of(&request.learned);
+        let speed_at = |gap| self.model.speed(at, gap, carried, floor, ceiling);
+        let used = |gap, speed| self.model.utilisation(&Point { speed, ..*at }, gap);
+        // Time that the missing margin is worth, and that which the crossing takes, s.
+        let price = |used: Ratio| {
+            let likely = (used - (friction - READ_LOW)).max(Q16::ZERO) * LIKELY_TIMES;
+            divide((used - usable).max(Q16::ZERO) + likely, MARGIN_PER_SECOND)
+        };
+        let takes = |gap: Millimetres, speed| {
+            let approach = self.approach(request, &Point { speed, ..*at }, carried, gap);
+            self.travels(request.distance, &approach)
+                + self.lost(approach.slowest_speed, self.cruise_speed)
+        };
+        let grips = |gap: Millimetres, speed| {
+            let needs = used(gap, speed);
+            let smaller = gap * SMALLER;
+            let slower = speed_at(smaller);
+            needs <= usable
+                || needs < friction
+                    && takes(gap, speed) + price(needs)
+                        <= takes(smaller, slower) + price(used(smaller, slower))
+        };
+        let (mut gap, mut speed) = (target, speed_at(target));
         if !grips(gap, speed) && speed > floor {
-            let floor = LEAST_FOR_GRIP.max(floor).min(ceiling);
             let mut part = target.half();
             gap = part;
             for _ in 0..GRIP_HALVINGS {
                 part = part.half();
                 let larger = gap + part;
-                let speed = speed_at(larger, floor);
+                let speed = speed_at(larger);
                 if grips(larger, speed) || speed <= floor {
                     gap = larger;
                 }
             }
-            speed = speed_at(gap, floor);
+            speed = speed_at(gap);
         }
         let at = Point { speed, ..*at };
         let carries = self.model.force(&at, gap) <= carried + HOLDS_WITHIN;
@@ -356,6 +398,7 @@ impl Planner {
         let travels = starts + self.travels(request.distance, &approach);
         let rising = ready > travels;
         let time = ready.max(travels) + self.lost(approach.slowest_speed, self.cruise_speed);
+        let time = time + price(used(gap, speed));
         Choice { preload, gap, speed, time, rising, holds }
     }
 
@@ -368,49 +411,83 @@ impl Planner {
         plan.brake_time = self.timing.speed_change(plan.cruise_speed - plan.approach.slowest_speed);
     }
 
-    /// Compares a crossing with the model and corrects the stiffness, bounded.
-    fn review(&self, review: &Review, request: &PlanRequest) -> Outcome {
-        let scale = request.scale;
-        let at =
-            Point { direction: review.direction, speed: review.speed, scale: Scale::new(scale) };
-        let force = review.preload + self.coupling * review.tan_arm;
+    /// Compares a crossing with the model, and learns from it.
+    ///
+    /// A scalar Kalman filter on the logarithm of the stiffness scale. What is known of the tread is
+    /// never surer than of one as known: each sleeve is another. A stiffness that contradicts
+    /// what is known makes that uncertain by as much: a stiffer one is taken at once, too
+    /// stiff a guess only costs time; a softer one with the next that agrees.
+    fn review(&self, review: &Review, known: &Learned) -> Outcome {
+        let at = Point {
+            direction: review.direction,
+            speed: review.speed,
+            scale: Scale::new(known.scale),
+            extra_load: known.extra_load,
+        };
+        let force = review.preload + self.thrust(known, review.tan_arm);
         let crossing = self.model.crossing(&at, force);
-        let unchanged = |strange| Outcome {
+        let (friction, _) = self.friction_of(known);
+        let mut outcome = Outcome {
             gap_predicted: crossing.gap,
-            slip_margin: crossing.slip_margin,
-            scale,
-            reserve: request.reserve,
+            slip_margin: friction - crossing.utilisation,
+            learned: *known,
             bounded: false,
-            strange,
+            strange: false,
             wide: review.seen > self.gap_ref(review.direction) * WIDE,
         };
         if !review.trusted {
-            return unchanged(false);
+            return outcome;
         }
-        let observed = self.model.observed_scale(&at, review.gap, force);
-        let off = (observed - scale).abs();
-        let strange = off > STRANGE * scale;
-        let stiffer = observed > scale;
-        // Further off than any tread or tolerance, the measurement is wrong.
-        let outlier = if stiffer { OUTLIER_STIFFER } else { OUTLIER };
-        if off > outlier * scale {
-            return unchanged(strange);
+        let learned = &mut outcome.learned;
+        if !review.slipped {
+            learned.grips = learned.grips.max(crossing.utilisation);
         }
+        let ratio = divide(self.model.observed_scale(&at, review.gap, force), known.scale);
+        outcome.strange = (ratio - Q16::ONE).abs() > STRANGE;
+        // The logarithm, by its first Pade approximant: at most 2 in magnitude.
+        let off = divide((ratio - Q16::ONE) + (ratio - Q16::ONE), ratio + Q16::ONE);
+        let measured = if known.unknown {
+            UNKNOWN_VARIANCE.max(self.measured_variance)
+        } else {
+            self.measured_variance
+        };
+        let mut variance = known.deviation * known.deviation;
+        let beyond = off * off - measured;
+        let surprising = off * off > (variance + measured) * SURPRISE;
+        if surprising && off > Q16::ZERO {
+            variance = beyond;
+        }
+        let gain = divide(variance, variance + measured);
+        variance = if surprising && off < Q16::ZERO { beyond } else { gain * measured };
+        learned.deviation = sqrt(variance).max(KNOWN_DEVIATION);
+        let half = off * gain.half();
+        let wanted = known.scale * divide(Q16::ONE + half, Q16::ONE - half);
+        learned.scale = between(wanted, self.scale_range.0, self.scale_range.1);
         let missed = divide((review.gap - crossing.gap).abs(), review.gap.max(q16(100_000)));
-        let reserve = request.reserve.half() + missed * self.by_reserve;
-        let reserve = reserve.clamp(LEAST_RESERVE, MOST_RESERVE);
-        let gain = if stiffer && off > SURE { self.gain.max(SURE_GAIN) } else { self.gain };
-        let most = if stiffer && off > SURE { LARGEST_STIFFER } else { LARGEST_CORRECTION };
-        let step = ((observed - scale) * gain).clamp(-LARGEST_CORRECTION, most);
-        let (low, high) = self.scale_range;
-        let wanted = scale + step;
-        let scale = wanted.clamp(low, high);
-        Outcome { scale, reserve, bounded: scale != wanted, ..unchanged(strange) }
+        let reserve = known.reserve.half() + missed * self.by_reserve;
+        learned.reserve = reserve.clamp(LEAST_RESERVE, MOST_RESERVE);
+        outcome.bounded = learned.scale != wanted;
+        outcome
     }
 
-    fn arm_thrust_at(&self, step: u8) -> Newtons {
-        let index = usize::from(step).saturating_sub(1);
-        self.arm_thrust.get(index).copied().unwrap_or(Newtons::ZERO)
+    /// Friction as far as known, and the part of it that may be used. What has gripped may be used
+    /// again; what has slipped did so by the model's own reading.
+    fn friction_of(&self, learned: &Learned) -> (Ratio, Ratio) {
+        let friction = self.friction.min(learned.slips);
+        let margin = self.friction - self.usable;
+        let usable = self.usable.min(learned.slips - (margin - READ_LOW).max(Q16::ZERO));
+        (friction, usable.max(learned.grips.min(friction)))
+    }
+
+    /// Radial force that the load adds at this tangent of the arm angle, N.
+    fn thrust(&self, learned: &Learned, tan_arm: Ratio) -> Newtons {
+        (self.load + learned.extra_load) * self.coupling * tan_arm
+    }
+
+    fn arm_thrust_at(&self, request: &PlanRequest) -> Newtons {
+        let index = usize::from(request.step).saturating_sub(1);
+        let tangent = self.tangents.get(index).copied().unwrap_or_default();
+        self.thrust(&request.learned, tangent)
     }
 
     /// Least preload for the step ahead, N: that of cruise, or less while it is being built up.
@@ -439,7 +516,8 @@ struct Choice {
     preload: Newtons,
     gap: Millimetres,
     speed: MillimetresPerSecond,
-    /// Until the step is behind, s, but for what is the same for every preload.
+    /// Until the step is behind, s, but for what is the same for every preload, and what the
+    /// missing margin is worth.
     time: Seconds,
     /// The wheel waits for it: it lifts off while the preload rises.
     rising: bool,

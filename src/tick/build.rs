@@ -44,10 +44,7 @@ impl Controller {
             spring: checked("preload.spring_n_per_mm", preload.spring_n_per_mm)?,
             preload_latency: checked("preload.delay_s", rig.preload_latency_s())?,
             load: checked("plant.top_load_n", load)?,
-            arm_thrust_max: checked(
-                "plant.arm_coupling",
-                rig.plant.arm_coupling * rig.plant.top_load_n * rig.plant.top_load_share,
-            )?,
+            arm_coupling: checked("plant.arm_coupling", rig.plant.arm_coupling)?,
             inertia: checked(
                 "drive.reflected_mass_kg",
                 (rig.drive.reflected_mass_kg + rig.plant.moved_mass_kg) * 1e-3,

@@ -90,7 +90,9 @@ impl Controller {
         let (slipping, slipped) = state.estimate.slips();
         if slipped {
             targets.preload = most_preload;
+            targets.speed = targets.speed.min(cross_speed);
         }
+        self.learn_slip(state, tick);
         if slipping {
             targets.speed = targets.speed.min(self.least_speed);
         }
@@ -100,6 +102,18 @@ impl Controller {
             tick.trigger(Trigger::Leg(leg));
         }
         targets
+    }
+
+    /// A slip under this preload shows a friction below what that needs: another plan is asked for.
+    /// Retracting no choice needs much less, and an edge shows a slip less well.
+    fn learn_slip(&self, state: &mut State, tick: &mut TickContext<'_>) {
+        let lost = state.estimate.crossing.as_ref().map_or(Q16::ZERO, |open| open.slip.lost);
+        let grows = lost > state.planning.lost;
+        state.planning.lost = lost;
+        if grows && state.estimate.direction == Direction::Deploy {
+            state.planning.slipped = state.planning.slipped.max(Some(tick.pressed()));
+            self.ask(state, tick);
+        }
     }
 
     /// On a corner the wheel's rise compresses the spring: limits the speed to what the
@@ -159,8 +173,9 @@ impl Controller {
             self.corner(state, tick, targets.speed)
         };
         let measured = tick.sensed.speed.value;
-        let level = resisting(wanted, self.load);
-        let climb = |part: Ratio| resisting(wanted, self.load + climb * part) - level;
+        let held = self.load_of(state);
+        let level = resisting(wanted, held);
+        let climb = |part: Ratio| resisting(wanted, held + climb * part) - level;
         let error = wanted - measured;
         self.speed_loop.hand_over(&mut state.speed_loop, climb(Q16::ONE), added, error);
         let (climb, drift) = (climb(blend), drift * blend);

@@ -6,7 +6,7 @@ use crate::estimate::OpenCrossing;
 use crate::fault::{Fault, Limit};
 use crate::model::{Outcome, Plan, PlanRequest};
 use crate::supervise::Mode;
-use crate::units::{Newtons, Seconds, Tick, ticks_to_seconds};
+use crate::units::{Direction, Newtons, Seconds, Tick, ticks_to_seconds};
 
 /// Ticks for which the drive may wait for the preload unreported: a spring that moves with the
 /// wheel takes that long to be followed.
@@ -27,12 +27,11 @@ impl Controller {
             sequence: planning.sequence,
             direction: estimate.direction,
             step: estimate.next_step,
-            scale: planning.scale,
-            unknown: planning.unknown,
-            reserve: planning.reserve,
+            learned: planning.learned,
             preload: tick.sensed.preload_filtered,
             distance: self.estimator.distance(estimate).unwrap_or_default(),
             review: planning.review,
+            slipped: planning.slipped,
         });
     }
 
@@ -56,11 +55,10 @@ impl Controller {
             }
         }
         if let Some(outcome) = plan.outcome.as_ref() {
-            planning.scale = outcome.scale;
-            planning.reserve = outcome.reserve;
+            planning.learned = outcome.learned;
             // What a crossing has shown counts for more than what the tread showed before.
             let trusted = planning.review.is_some_and(|review| review.trusted);
-            planning.unknown &= !trusted || outcome.strange || outcome.wide;
+            planning.learned.unknown &= !trusted || outcome.strange || outcome.wide;
             if outcome.bounded {
                 tick.log(Event::Limit(Limit::AdaptationBounded));
             }
@@ -76,6 +74,11 @@ impl Controller {
             }
         }
         planning.plan = Some(*plan);
+        planning.slipped = None;
+        planning.learned.slips = plan.slips;
+        if plan.short && matches!(state.mode, Mode::Run(Direction::Deploy, _)) {
+            tick.fail(Fault::FrictionShort);
+        }
     }
 
     fn await_answer(&self, state: &mut State, tick: &mut TickContext<'_>) {
@@ -132,7 +135,7 @@ fn record(tick: &mut TickContext<'_>, open: &OpenCrossing, outcome: &Outcome) {
         slip: open.slip.lost,
         lead_time: lead_time(open, point.at),
         slip_margin: outcome.slip_margin,
-        stiffness_scale: outcome.scale,
+        stiffness_scale: outcome.learned.scale,
         limited_by: open.limited_by,
     }));
 }
@@ -151,7 +154,7 @@ fn lead_time(open: &OpenCrossing, lifted_at: Tick) -> Seconds {
 mod tests {
     use super::super::tests::{sensed, within};
     use super::*;
-    use crate::model::{Planner, Review};
+    use crate::model::{Learned, Planner, Review};
     use crate::rig::Rig;
     use crate::supervise::Leg;
     use crate::units::{Direction, Q16, q16};
@@ -228,30 +231,30 @@ mod tests {
             gap: Q16::ZERO,
             seen: Q16::ZERO,
             trusted: false,
+            slipped: false,
         };
         let answer = |review: Review| {
             planner.plan(&PlanRequest {
                 sequence: 1,
                 direction: Direction::Deploy,
                 step: 2,
-                scale: Q16::ONE,
-                unknown: true,
-                reserve: Q16::ONE,
+                learned: Learned { unknown: true, ..Learned::default() },
                 preload: q16(50_000_000),
                 distance: q16(20_000_000),
                 review: Some(review),
+                slipped: None,
             })
         };
         let gap = answer(review).outcome.expect("a review").gap_predicted;
         for trusted in [false, true] {
             let review = Review { gap, trusted, ..review };
             let mut state = running();
-            (state.planning.sequence, state.planning.unknown) = (1, true);
+            (state.planning.sequence, state.planning.learned.unknown) = (1, true);
             state.planning.review = Some(review);
             within(&sensed(0, 0.0, 0.3), |controller, pass| {
                 controller.take_plan(&mut state, pass, Some(&answer(review)));
             });
-            assert_eq!(state.planning.unknown, !trusted);
+            assert_eq!(state.planning.learned.unknown, !trusted);
         }
     }
 

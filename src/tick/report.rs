@@ -3,13 +3,13 @@
 use super::{Controller, Event, State, Telemetry, TickContext};
 use crate::control::schedule::Targets;
 use crate::estimate::crossing::Contact;
-use crate::estimate::{ContactStage, Findings};
+use crate::estimate::{ContactStage, Findings, Shown};
 use crate::fault::Limit;
-use crate::model::Review;
-use crate::model::planner::KNOWN_SCALE;
+use crate::model::planner::{KNOWN_SCALE, SHOWN_DEVIATION};
+use crate::model::{Learned, Review};
 use crate::numeric::part;
 use crate::supervise::{Leg, Mode};
-use crate::units::{Duty, MotorCommand, Q16, q16};
+use crate::units::{Duty, MotorCommand, Q16, Ratio, q16};
 
 use super::state::Approach;
 
@@ -39,19 +39,39 @@ impl Controller {
                 gap: point.gap,
                 seen: open.gap,
                 trusted: open.expected && plausible,
+                slipped: open.slip.lost > Q16::ZERO,
             });
         }
-        // What a crossing has shown goes before what the tread shows ahead of it.
-        let shown = found.stiffness.filter(|_| state.planning.scale == Q16::ONE);
-        let stiffer = shown.filter(|stiffness| *stiffness > Q16::ONE);
-        state.planning.scale = stiffer.unwrap_or(state.planning.scale);
-        state.planning.unknown |= stiffer.is_some_and(|stiffness| stiffness > KNOWN_SCALE);
-        if found.replan || stiffer.is_some() {
+        let shown = found.shown.is_some_and(|shown| {
+            self.learn(&mut state.planning.learned, &shown, tick.sensed.tan_arm)
+        });
+        if found.replan || shown {
             self.ask(state, tick);
         }
         if let Some(fault) = found.fault {
             tick.fail(fault);
         }
+    }
+
+    /// What the tread and the drive have shown before the first crossing; whether it is other than
+    /// known. What a crossing has shown of the tread goes before it.
+    fn learn(&self, learned: &mut Learned, shown: &Shown, tan_arm: Ratio) -> bool {
+        let before = learned.extra_load;
+        if let Some(load) = shown.load {
+            // Within two sigmas of it, the known load is the better one.
+            let extra = load - self.load;
+            let within = extra.abs() < shown.load_sigma + shown.load_sigma;
+            learned.extra_load = if within { Q16::ZERO } else { extra };
+        }
+        let reloaded = learned.extra_load - before;
+        let stiffness = shown.stiffness(reloaded * self.arm_coupling * tan_arm);
+        let stiffer = learned.scale == Q16::ONE && stiffness > Q16::ONE;
+        if stiffer {
+            learned.scale = stiffness;
+            learned.deviation = SHOWN_DEVIATION;
+            learned.unknown |= stiffness > KNOWN_SCALE;
+        }
+        reloaded != Q16::ZERO || stiffer
     }
 
     /// Observes the arm's mode from the approach to a step until the step is passed. The observer
@@ -87,8 +107,10 @@ impl Controller {
         let duty = |command: MotorCommand| if command.enable { command.duty } else { Duty::ZERO };
         let crossing = matches!(state.mode, Mode::Run(_, Leg::Crossing | Leg::Approach));
         let plan = state.planning.plan.as_ref();
-        let planned = plan.map_or(self.friction, |plan| plan.slip_margin);
-        let rolling = self.friction - part(self.load, tick.pressed());
+        let learned = &state.planning.learned;
+        let friction = self.friction.min(learned.slips);
+        let planned = plan.map_or(friction, |plan| plan.slip_margin);
+        let rolling = friction - part(self.load_of(state), tick.pressed());
         let sensed = tick.sensed;
         Telemetry {
             at: tick.now,

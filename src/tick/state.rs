@@ -6,11 +6,13 @@ use crate::control::speed_loop::SpeedLoopState;
 use crate::estimate::crossing::Contact;
 use crate::estimate::vibration::VibrationTracking;
 use crate::estimate::{ContactStage, EstimateState, OpenCrossing, Place, PositionConfidence};
-use crate::model::{Plan, Review};
+use crate::model::{Learned, Plan, Review};
 use crate::sense::{SensesState, Zeros};
 use crate::supervise::service::ServiceState;
 use crate::supervise::{Leg, Mode, MonitorState};
-use crate::units::{Direction, MillimetresPerSecond, MillimetresPerSecond2, Q16, Ratio, Tick};
+use crate::units::{
+    Direction, Millimetres, MillimetresPerSecond, MillimetresPerSecond2, Newtons, Q16, Ratio, Tick,
+};
 
 /// Ticks over which the feed-forward of a detected corner is blended in.
 const BLEND_TICKS: u8 = 32;
@@ -60,38 +62,23 @@ pub(super) struct Approach {
 }
 
 /// The exchange with the model task.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Planning {
     pub plan: Option<Plan>,
     /// Sequence of the newest request.
     pub sequence: u32,
     /// Ticks for which it has waited for its answer, from 1; 0 if answered.
     pub asked: u32,
-    /// Estimated over nominal stiffness of the tread.
-    pub scale: Ratio,
-    /// The tread has shown before the first crossing that it is not as known.
-    pub unknown: bool,
-    /// Share of the reserve below the reference gap.
-    pub reserve: Ratio,
+    /// Tread, load and friction as learned so far.
+    pub learned: Learned,
+    /// Slip on the corner so far, mm.
+    pub lost: Millimetres,
+    /// Largest radial force under which it has grown since the last plan, N.
+    pub slipped: Option<Newtons>,
     /// The last crossing, until its review is complete.
     pub closed: Option<OpenCrossing>,
     /// The review without an answer; part of every request until then.
     pub review: Option<Review>,
-}
-
-impl Default for Planning {
-    fn default() -> Self {
-        Self {
-            plan: None,
-            sequence: 0,
-            asked: 0,
-            scale: Q16::ONE,
-            unknown: false,
-            reserve: Q16::ONE,
-            closed: None,
-            review: None,
-        }
-    }
 }
 
 impl State {
@@ -121,7 +108,7 @@ impl State {
 
     /// Estimated over nominal stiffness of the tread.
     pub const fn stiffness_scale(&self) -> Ratio {
-        self.planning.scale
+        self.planning.learned.scale
     }
 
     /// Speed reference, signed outwards.

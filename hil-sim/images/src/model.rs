@@ -7,7 +7,7 @@
 
 use interstage::model::effective_stiffness::{self, FAST_DEGREE, Kind, RUN_DEGREE, RUN_END};
 use interstage::model::formula::{Formula, LEAST_RUN};
-use interstage::model::reduced::{self, ReducedModel, Scale};
+use interstage::model::reduced::{self, ReducedModel};
 use interstage::rig::Rig;
 use interstage::units::Direction;
 use interstage::units::Q16;
@@ -62,8 +62,7 @@ impl Given {
     }
 
     fn point(&self) -> reduced::Point {
-        let speed = Q16::from_bits(self.speed);
-        reduced::Point { direction: self.direction(), speed, scale: Scale::NOMINAL }
+        reduced::Point::nominal(self.direction(), Q16::from_bits(self.speed))
     }
 }
 

@@ -3,7 +3,7 @@
 use clap::ValueEnum;
 use interstage::model::effective_stiffness::Kind;
 use interstage::model::formula::{Formula, LEAST_RUN};
-use interstage::model::reduced::{Point, ReducedModel, Scale};
+use interstage::model::reduced::{Point, ReducedModel};
 use interstage::rig::Rig;
 use interstage::units::Direction;
 use interstage::units::Q16;
@@ -311,7 +311,7 @@ fn reduced(rig: &Rig, case: &CrossingSetup) -> Figures {
 fn fixed(rig: &Rig, case: &CrossingSetup) -> Result<Figures, Failure> {
     let model = ReducedModel::try_build_for(rig, case.load_n)?;
     let speed = Q16::from_num(case.speed_mm_s);
-    let point = Point { direction: case.direction, speed, scale: Scale::NOMINAL };
+    let point = Point::nominal(case.direction, speed);
     let crossing = model.crossing(&point, Q16::from_num(case.preload_n));
     Ok(Figures {
         gap_mm: crossing.gap.to_num(),

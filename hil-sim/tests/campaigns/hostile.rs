@@ -7,7 +7,7 @@
 use super::parity;
 use hil_sim::session::Echo;
 use interstage::model::reduced::{Point, ReducedModel, Scale};
-use interstage::model::{Plan, PlanRequest, Planner, Review};
+use interstage::model::{Learned, Plan, PlanRequest, Planner, Review};
 use interstage::rig::Rig;
 use interstage::sense::raw::{
     AdcCode, AngleFrame, BridgeCode, BridgeCodes, EncoderCount, Sample, SensorFrame,
@@ -222,7 +222,8 @@ fn asked(planner: &Planner, model: &ReducedModel) -> Option<String> {
     let pairs = ends.into_iter().flat_map(|a| ends.into_iter().map(move |b| (a, b)));
     for direction in [Direction::Deploy, Direction::Retract] {
         for (speed, ratio) in pairs.clone() {
-            let point = Point { direction, speed, scale: Scale::new(ratio) };
+            let scale = Scale::new(ratio);
+            let point = Point { direction, speed, scale, extra_load: ratio };
             for (a, b) in pairs.clone() {
                 let crossing = model.crossing(&point, a);
                 for gap in [model.gap(&point, a), crossing.gap] {
@@ -240,17 +241,23 @@ fn asked(planner: &Planner, model: &ReducedModel) -> Option<String> {
                     gap: ratio,
                     seen: ratio,
                     trusted: true,
+                    slipped: true,
                 };
                 let request = PlanRequest {
                     sequence: 1,
                     direction,
                     step: 2,
-                    scale: ratio,
-                    unknown: false,
-                    reserve: Q16::ONE,
+                    learned: Learned {
+                        scale: ratio,
+                        extra_load: a,
+                        grips: b,
+                        slips: ratio,
+                        ..Learned::default()
+                    },
                     preload: Q16::from_num(33),
                     distance: Q16::from_num(4),
                     review: Some(review),
+                    slipped: Some(a),
                 };
                 let _ = planner.plan(&request);
             }

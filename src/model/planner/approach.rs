@@ -60,7 +60,7 @@ impl Planner {
         // lift off earlier.
         let fast = self.model.gap(&Point { speed: window_speed, ..*at }, carried);
         let earlier = (self.lift(direction, fast) - lift).max(Q16::ZERO)
-            + (request.scale - KNOWN_SCALE).max(Q16::ZERO) * EARLIER_PER_SCALE;
+            + (request.learned.scale - KNOWN_SCALE).max(Q16::ZERO) * EARLIER_PER_SCALE;
         let slow_from = ready_from + earlier;
         // At the least speed nothing is left to correct a gap with: the wheel stays slow until it
         // has surely lifted off.
@@ -82,7 +82,7 @@ impl Planner {
             lift,
         };
         let slowest_speed = at.speed * self.dip.part;
-        let known = !request.unknown && request.scale <= KNOWN_SCALE;
+        let known = !request.learned.unknown && request.learned.scale <= KNOWN_SCALE;
         let known = known && self.prescribed_speed.is_none();
         if direction == Direction::Retract || !known || slowest_speed < self.least_speed {
             return slow;

@@ -315,7 +315,7 @@ mod tests {
             for (i, j) in (0..24).flat_map(|i| (0..24).map(move |j| (i, j))) {
                 let speed = 100f64.powf(f64::from(i) / 23.0);
                 let force = 15.0 * 10f64.powf(f64::from(j) / 23.0);
-                let at = Point { direction, speed: Q16::from_num(speed), scale: Scale::NOMINAL };
+                let at = Point::nominal(direction, Q16::from_num(speed));
                 let (speed, wanted) = (at.speed.to_num::<f64>(), Q16::from_num(force));
                 let force = wanted.to_num::<f64>();
                 let exact = formula.crossing(direction, speed, force, load);
@@ -415,6 +415,7 @@ mod tests {
                 direction: Direction::ALL[usize::from(back)],
                 speed: q(speed),
                 scale: Scale::new(q(scale)),
+                extra_load: q(gap),
             };
             let crossing = model.crossing(&at, q(force));
             let (low, high) = model.gap_range();
@@ -457,11 +458,7 @@ mod tests {
         let model = ReducedModel::try_build(&rig).unwrap();
         let formula = Formula::new(&rig);
         for speed in [2.0, 8.0, 30.0, 100.0] {
-            let at = Point {
-                direction: Direction::Deploy,
-                speed: Q16::from_num(speed),
-                scale: Scale::NOMINAL,
-            };
+            let at = Point::nominal(Direction::Deploy, Q16::from_num(speed));
             let got = model.crossing(&at, Q16::from_num(60)).impact_stress_kpa.to_num::<f64>();
             let exact = 1e-3 * formula.impact.stress_pa(speed);
             assert!((got - exact).abs() < 5e-5 + 1e-4 * exact, "{got} {exact}");
