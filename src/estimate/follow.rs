@@ -567,7 +567,9 @@ mod tests {
                 let estimator = estimator();
                 let doubt = if known.is_unsure() { UNSURE_WITHIN } else { Q16::ZERO };
                 let bound = estimator.corner().first_contact(direction.opposite()) + doubt;
-                let level = sensed(0, 0.0, 0.3);
+                let watch = &estimator.watch;
+                watch.begin_on_corner(&mut state.watch, direction, 0);
+                let level = sensed(0, 0.05, 0.3);
                 let mut clear = |past: Millimetres| {
                     state.position = face + past * Q16::from_num(direction.sign());
                     estimator.clear_of(&state, &level)
