@@ -248,7 +248,9 @@ impl Estimator {
             Direction::Deploy => open.slip.step(sensed.travel, position + ahead),
             Direction::Retract => {
                 let fall = self.watch.rise(&state.watch, state.direction, &seen) + seen.compression;
-                let at = OnEdge { travel: sensed.travel, position, fall, depth: seen.compression };
+                let lag = (sensed.speed.value * FILTER_LAG).widen();
+                let travel = sensed.travel.saturating_sub(lag);
+                let at = OnEdge { travel, position, fall, depth: seen.compression };
                 let Some(landing) = open.slide.step(self.watch.radius(), &at) else { return };
                 open.landing = Some(landing);
                 open.slip.lost += landing.slid;

@@ -29,7 +29,7 @@ const GOES_ON: Ratio = q16(600_000);
 /// A retracting wheel on the edge.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OnEdge {
-    /// Travel of the tread.
+    /// Travel of the tread when the arm was there.
     pub travel: Travel,
     /// Position, mm.
     pub position: Millimetres,
