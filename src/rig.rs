@@ -84,6 +84,10 @@ pub struct Tread {
     pub stiffening: f64,
     /// Relaxation time tau, s.
     pub tau_s: f64,
+    /// Tangential stiffness of the relaxed tread, axle against wall, N/mm; it stiffens and
+    /// relaxes as the tread does, and sets the creep. Derived: a bonded layer 8 mm thick of the
+    /// modulus that the published gaps give, 19 on a corner and 24 on the wall.
+    pub tangential_n_per_mm: f64,
 }
 
 /// Loads and friction.
@@ -107,9 +111,6 @@ pub struct Loads {
     /// the wheel into the wall; -1: leading arm, thrust lifts it; 0: parallel guide.
     /// Chosen: 1.
     pub arm_coupling: f64,
-    /// Creepage at which the tread transmits 63 % of its friction, dimensionless.
-    /// Chosen: 0.01, typical of solid rubber tyres.
-    pub elastic_creep: f64,
 }
 
 /// Pre-tightener: motor, screw and spring.

@@ -1,5 +1,6 @@
 //! Follows a crossing: what the watch detects becomes odometry, level and review.
 
+use super::creep::Pulled;
 use super::crossing::{Contact, CrossingEvent, Lift, WatchInput};
 use super::odometry::Rolling;
 use super::restore::UNSURE_WITHIN;
@@ -52,7 +53,8 @@ impl Estimator {
         let seen = self.watch_input(state, tick.sensed);
         let event = self.watch.step(&mut state.watch, direction, &seen);
         let on_corner = state.on_corner();
-        let creep = self.creep.outwards(tick.pressed);
+        let (creep, wound) = self.creep.outwards(&self.pulled(state, tick));
+        state.odometry.wind(wound);
         let rolling = Rolling {
             radius: tick.sensed.radius.value,
             lag: self.worn
@@ -379,6 +381,26 @@ impl Estimator {
         if open.lift.is_some() && !open.turned {
             found.closed = Some((open, measured.plausible));
             found.replan = true;
+        }
+    }
+
+    /// What moves the tread along the wall.
+    fn pulled(&self, state: &EstimateState, tick: &Follow<'_>) -> Pulled {
+        let (direction, contact) = (state.direction, state.watch.contact);
+        let at = state.position;
+        let edge = state.extra_face(at).or(self.steps.next_face(at));
+        let edge = edge.filter(|_| contact != Contact::Wall);
+        let slope = edge.map_or(Q16::ZERO, |ahead| match contact {
+            Contact::Both => self.corner().drive_slope(direction, ahead),
+            _ => self.corner().climb(ahead),
+        });
+        Pulled {
+            pressed: tick.pressed,
+            climb: tick.pressed * slope,
+            edge,
+            on_wall: matches!(contact, Contact::Wall | Contact::Both),
+            compression: tick.sensed.compression_filtered,
+            speed: tick.sensed.speed.value,
         }
     }
 

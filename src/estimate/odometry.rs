@@ -48,6 +48,8 @@ pub struct Odometry {
     share: Ratio,
     gain: Ratio,
     from: Option<Start>,
+    /// By how much the tread is displaced outwards of the axle, once that is known in a run, mm.
+    wound: Option<Millimetres>,
 }
 
 impl Default for Odometry {
@@ -61,6 +63,7 @@ impl Default for Odometry {
             share: Ratio::ZERO,
             gain: Ratio::ZERO,
             from: None,
+            wound: None,
         }
     }
 }
@@ -95,6 +98,7 @@ impl Odometry {
         *self = Self {
             offset: position.widen().saturating_sub(travel),
             origin: position,
+            wound: self.wound,
             ..Self::default()
         };
     }
@@ -126,6 +130,12 @@ impl Odometry {
         let [place, scale] = self.variance;
         let all = place + reach * (self.covariance + self.covariance + reach * scale);
         sqrt(all.max(Q16::ZERO)) * PLACE
+    }
+
+    /// The tread is displaced outwards of the axle by `wound`, mm.
+    pub fn wind(&mut self, wound: Millimetres) {
+        let before = self.wound.replace(wound).unwrap_or(wound);
+        self.offset = self.offset.saturating_sub((wound - before).widen());
     }
 
     /// The wheel has slipped: the axle is `lost` further in than the tread's travel has it, give or

@@ -35,6 +35,8 @@ pub struct CornerProfile {
     drive_slope: [Table<65>; 2],
     /// Distance of first touch, mm.
     touch: Millimetres,
+    /// Distance of lift-off, mm.
+    lift: Millimetres,
     /// Half the patch on the continuous wall: distance behind the edge at which it is
     /// clear of it, mm.
     patch: Millimetres,
@@ -85,6 +87,7 @@ impl CornerProfile {
             slope,
             drive_slope: [drive_slope(touch)?, drive_slope(back)?],
             touch: checked("rig.step_height_mm", touch)?,
+            lift: checked("rig.step_height_mm", lift)?,
             patch: checked("rig.wheel_radius_mm", patch)?,
         })
     }
@@ -113,6 +116,12 @@ impl CornerProfile {
             Direction::Deploy => out.eval(ahead),
             Direction::Retract => back.eval(ahead),
         }
+    }
+
+    /// Motor force per radial force on a corner `ahead` mm outwards that carries alone; past it
+    /// the recovering tread still costs some.
+    pub fn climb(&self, ahead: Millimetres) -> Ratio {
+        self.drive_slope(Direction::Deploy, ahead.min(self.lift)).max(self.slope(ahead))
     }
 
     /// Rise per axial travel outwards with the face `ahead` mm outwards of the centre,

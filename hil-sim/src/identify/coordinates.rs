@@ -101,7 +101,7 @@ impl Coordinates {
             known(0.0, spread.preload_sensor_gain_rel),
             known(0.0, spread.compression_sensor_gain_rel),
             free(0.0, UNKNOWN_ARM_MRAD),
-            known(nominal.elastic_creep.ln(), CREEP_REL),
+            known(nominal.tangential_n_per_mm.ln(), CREEP_REL),
             known(0.0, DRIVE_REL),
         ];
         let all = nominal.wall.steps().iter();
@@ -163,7 +163,7 @@ impl Coordinates {
             },
             wall: Wall::new(steps.collect()),
             mu: x[FRICTION].exp(),
-            elastic_creep: x[CREEP].exp(),
+            tangential_n_per_mm: x[CREEP].exp(),
             load_n: x[LOAD].exp(),
             spring_n_per_mm: 0.0,
             modes: Vec::new(),

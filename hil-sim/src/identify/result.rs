@@ -197,7 +197,7 @@ impl Document<'_> {
             ((RADIUS, "rig.wheel_radius_mm", "mm", "shape of the climbs"), &itself),
             ((LOAD_GAIN, "preload sensor gain", "", "loads against the drive"), &f64::exp),
             ((TREAD_GAIN, "compression sensor gain", "", "compression against the arm"), &f64::exp),
-            ((CREEP, "plant.elastic_creep", "", "creep at the climbs"), &f64::exp),
+            ((CREEP, "tread.tangential_n_per_mm", "N/mm", "creep at the climbs"), &f64::exp),
             ((DRIVE, "drive force over nominal", "", "effort against load"), &f64::exp),
             ((ARM_ZERO, "sense.angle_zero_code", "codes", "arm angle at known radii"), &arm_zero),
         ];
@@ -292,7 +292,7 @@ impl Document<'_> {
         let most = trajectories.map(|t| t.most_utilisation).fold(0.0, f64::max);
         let mut notes = vec![format!(
             "friction: the climbs used {most:.2}, so that it is at least that; the rest is what \
-             their creep shows, given plant.elastic_creep"
+             their creep shows, given tread.tangential_n_per_mm"
         )];
         notes.extend(self.runs.iter().filter(|run| run.traces.slips).map(|run| {
             let name = &run.name;

@@ -7,6 +7,7 @@ use rand_distr::{Distribution, StandardNormal};
 
 use super::actuators::DriveMotor;
 use super::arm::{Arm, ModeParameters};
+use super::grip::Shear;
 use super::ring::RingParameters;
 use super::spread::{Noise, Spread};
 use super::wall::{Step, Wall};
@@ -35,8 +36,8 @@ pub struct PlantParameters {
     pub stops_mm: (f64, f64),
     /// Friction of tread on wall.
     pub mu: f64,
-    /// Creepage at 63 % of friction.
-    pub elastic_creep: f64,
+    /// Tangential stiffness of the relaxed tread, N/mm.
+    pub tangential_n_per_mm: f64,
     /// Part of the compression by which the rolling radius is less than the undeformed one.
     pub rolling_compression: f64,
     /// Axial load on this wheel, N.
@@ -124,6 +125,16 @@ impl Draw {
 }
 
 impl PlantParameters {
+    /// The tread displaced along the wall: all its shear relaxes alike.
+    #[must_use]
+    pub fn shear(&self) -> Shear {
+        Shear {
+            n_per_mm: self.tangential_n_per_mm,
+            stiffening: self.ring.k_0 / self.ring.k_inf,
+            relaxations_s: self.ring.relaxations_s(),
+        }
+    }
+
     /// The plant of a seed: `rig` with this spread, and with these steps, each its position
     /// and how much higher than the table says it is, mm. Seed 0 is the nominal rig without
     /// mismatch; its sensors still quantise and have their noise.
@@ -138,7 +149,8 @@ impl PlantParameters {
         let nominal = Spread::none();
         let spread = if seed == 0 { &nominal } else { spread };
         let mut draw = Draw(ChaCha8Rng::seed_from_u64(seed));
-        let k_inf = rig.tread.k_inf_pa_per_m * 1e-9 * draw.factor(spread.k_inf_rel);
+        let stiffer = draw.factor(spread.k_inf_rel);
+        let k_inf = rig.tread.k_inf_pa_per_m * 1e-9 * stiffer;
         // Rubber that softens at once does not exist.
         let stiffening = (rig.tread.stiffening * draw.factor(spread.stiffening_rel)).max(1.0);
         let tau_s = rig.tread.tau_s * draw.factor(spread.tau_rel);
@@ -188,7 +200,8 @@ impl PlantParameters {
             wall_radius_mm: rig.rig.wall_radius_mm,
             stops_mm: (-STOP_ROOM_MM, rig.rig.travel_mm + STOP_ROOM_MM),
             mu,
-            elastic_creep: rig.plant.elastic_creep,
+            // Of the same rubber.
+            tangential_n_per_mm: rig.tread.tangential_n_per_mm * stiffer,
             rolling_compression: 1.0 / 3.0,
             load_n: load,
             mass_kg: rig.plant.moved_mass_kg,

@@ -4,30 +4,126 @@
 //! is taken along. Taken one after the other, with the forces of the step before, a carriage
 //! is caught at once that friction would have to accelerate, and energy comes from nowhere.
 //! Here the friction cone is resolved within the step: its end velocities are those that its
-//! forces give.
+//! forces give, and the tread between them winds up and creeps ([`WindUp`]).
 
-/// Logarithm of the part of friction left over, from which on a wheel counts as sliding:
-/// 99.9 % of it used.
-pub(super) const SLIDES_FROM: f64 = 6.907_755_278_982_137;
+/// Relaxation length of the traction over the length of the contact: pi G L / k_t, for the
+/// creep stiffness of a half-space and k_t of a layer of 8 mm (1.6 at 5 mm, 2.8 at 12 mm).
+const RELAXATION_LENGTHS: f64 = 2.1;
 
 /// Slip that is rounding, mm/s.
 const STANDS_BELOW: f64 = 1e-9;
 
+/// Rubber between rim and hub, displaced along the wall.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Shear {
+    /// Tangential stiffness of the relaxed tread, N/mm.
+    pub n_per_mm: f64,
+    /// Instant over relaxed stiffness.
+    pub stiffening: f64,
+    /// Both relaxation times, of equal share, s.
+    pub relaxations_s: [f64; 2],
+}
+
+/// Displacement of the rim against the hub along the wall, and how traction follows from it.
+///
+/// The lumped form of the brush model: traction is `k_t (w + (s - 1) (w - q))` with the
+/// displacement w and its memory q, the three-parameter solid of the tread. Strained rubber leaves
+/// the contact and unstrained rubber comes in: w is lost over a relaxation length sigma, q over
+/// the mean age of the rubber in contact, half its length. So a steadily rolling tread creeps by
+/// `F / (k_t sigma S)`, S being the stiffening that is left at that speed: `k_t sigma` is the
+/// creep stiffness. Near the limit of friction the contact
+/// slides in part, by Carter (1926): creep is `2 (1 - sqrt(1 - p)) / p` times as much.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct WindUp {
+    /// Displacement, mm, positive as the tread runs ahead of the wheel outwards.
+    pub mm: f64,
+    memory_mm: [f64; 2],
+}
+
+/// What a step of time makes of a [`WindUp`]: traction is `n_per_mm w + free_n`.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Winding {
+    n_per_mm: f64,
+    free_n: f64,
+    from_mm: f64,
+    /// Of the memory: the part taken over from the displacement, and what is left of it, mm.
+    follows: [(f64, f64); 2],
+    dt_s: f64,
+    /// Speed of creep per traction, as long as nothing slides, mm/s per N.
+    creeps: f64,
+}
+
+impl WindUp {
+    /// The step of `dt_s`, rolling at this speed, mm/s, on a contact of this length, mm.
+    #[must_use]
+    pub fn over(&self, shear: &Shear, rolling: f64, contact_mm: f64, dt_s: f64) -> Winding {
+        let renewed = 2.0 * rolling / contact_mm;
+        let follows = [0, 1].map(|i| {
+            let caught = dt_s / shear.relaxations_s[i];
+            let all = 1.0 + caught + renewed * dt_s;
+            (caught / all, self.memory_mm[i] / all)
+        });
+        let more = 0.5 * shear.n_per_mm * (shear.stiffening - 1.0);
+        let left: f64 = follows.iter().map(|(part, _)| 1.0 - part).sum();
+        let kept: f64 = follows.iter().map(|(_, kept)| kept).sum();
+        Winding {
+            n_per_mm: shear.n_per_mm + more * left,
+            free_n: -more * kept,
+            from_mm: self.mm,
+            follows,
+            dt_s,
+            creeps: rolling / (RELAXATION_LENGTHS * contact_mm * shear.rolling_n_per_mm(renewed)),
+        }
+    }
+
+    /// Steady displacement under this traction, N, at this speed, mm/s.
+    #[must_use]
+    pub fn steady(shear: &Shear, traction_n: f64, rolling: f64, contact_mm: f64) -> Self {
+        let renewed = 2.0 * rolling / contact_mm;
+        let mm = traction_n / shear.rolling_n_per_mm(renewed);
+        Self { mm, memory_mm: shear.relaxations_s.map(|tau_s| mm / (1.0 + renewed * tau_s)) }
+    }
+
+    /// Stored energy, mJ.
+    #[must_use]
+    pub fn stored_mj(&self, shear: &Shear) -> f64 {
+        let more = 0.5 * (shear.stiffening - 1.0);
+        let branches: f64 = self.memory_mm.iter().map(|q| more * (self.mm - q).powi(2)).sum();
+        0.5 * shear.n_per_mm * (self.mm * self.mm + branches)
+    }
+}
+
+impl Shear {
+    /// Stiffness in steady rolling that renews the tread in contact at this rate, 1/s, N/mm.
+    fn rolling_n_per_mm(&self, renewed: f64) -> f64 {
+        let unrelaxed = self.relaxations_s.map(|tau_s| renewed * tau_s / (1.0 + renewed * tau_s));
+        let more = 0.5 * (self.stiffening - 1.0) * (unrelaxed[0] + unrelaxed[1]);
+        self.n_per_mm * (1.0 + more)
+    }
+}
+
+impl Winding {
+    /// The displacement at the end of the step under this traction, N.
+    #[must_use]
+    pub fn end(&self, traction_n: f64) -> WindUp {
+        let mm = (traction_n - self.free_n) / self.n_per_mm;
+        WindUp { mm, memory_mm: self.follows.map(|(part, kept)| part * mm + kept) }
+    }
+}
+
 /// A driven wheel on a step of time from known speeds.
 ///
-/// With p the part of friction used, q = -ln(1 - p) and sigma the speed of the tread, the
-/// tread creeps by `sigma creep q`: at first in proportion to p, without bound as p comes
-/// to 1. With c and s the cosine and sine sums of the contact and m/dt its inertia, the
-/// carriage ends the step at `v1 = v0 + (mu p c - s - load) dt/m`, and friction is that for
-/// which this is `advance u1 - sigma creep q`, u1 being the tread's speed then.
+/// With p the part of friction used, the tread runs over the wall by its [`WindUp`]'s rate and
+/// by its creep, at first in proportion to p, twice as much at p = 1, and without bound there.
+/// With c and s the cosine and sine sums of the contact and m/dt its inertia, the carriage ends
+/// the step at `v1 = v0 + (mu p c - s - load) dt/m`, and friction is that for which this is
+/// `advance (u1 - that)`, u1 being the tread's speed then.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Grip {
     /// Friction of tread on wall.
     pub mu: f64,
-    /// Creepage at 63 % of friction.
-    pub creep: f64,
-    /// Speed of the tread that it creeps in proportion to, mm/s, not negative.
-    pub rolling: f64,
+    /// How the tread winds up.
+    pub winding: Winding,
     /// Axial load on the carriage, N.
     pub load_n: f64,
     /// Carriage's inertia over the step, N per mm/s.
@@ -67,16 +163,20 @@ impl Grip {
             return (0.0, (0.0, 0.0));
         }
         let most = self.mu * cosine;
-        let mut asked = self.asked(self.tread, sine);
-        let lag = self.inertia * self.rolling * self.creep;
+        let winding = &self.winding;
+        let slows = self.inertia * self.advance;
+        // Of all friction: what winding up and creep take of the carriage's speed.
+        let winds = slows * most * self.normal / (winding.n_per_mm * winding.dt_s);
+        let lag = 2.0 * slows * most * self.normal * winding.creeps;
+        let wound = slows * (winding.free_n / winding.n_per_mm + winding.from_mm) / winding.dt_s;
+        let mut asked = self.asked(self.tread, sine) + wound;
         let per_part = self.yields * self.normal * most;
-        let sense = if asked * self.tread < 0.0 { -1.0 } else { 1.0 };
-        let mut whole = most;
+        let mut whole = most + winds;
         let mut used = Used::of(asked.abs(), whole, lag);
+        let sense = if asked * self.tread < 0.0 { -1.0 } else { 1.0 };
         // Against its motion only does a load count for the worm.
         let resists = self.load(sense * used.part * most) > 0.0;
         if resists {
-            let slows = self.inertia * self.advance;
             asked -= slows * self.yields * self.offset_n * sense_of(self.tread);
             whole += slows * per_part;
             used = Used::of(asked.abs(), whole, lag);
@@ -84,12 +184,12 @@ impl Grip {
         let sense = if asked * self.tread < 0.0 { -1.0 } else { 1.0 };
         if resists && self.yields * self.load(sense * used.part * most) > self.tread.abs() {
             // Brought to rest within the step.
-            (asked, whole) = (self.asked(0.0, sine), most);
+            (asked, whole) = (self.asked(0.0, sine) + wound, most + winds);
             used = Used::of(asked.abs(), whole, lag);
         }
         let utilisation = (self.mu * used.part).copysign(asked);
-        let per = used.left / (whole * used.left + lag).max(f64::MIN_POSITIVE);
-        (utilisation, (-utilisation * per * whole / cosine, self.mu * per))
+        let per = used.root / (whole * used.root + 0.5 * lag).max(f64::MIN_POSITIVE);
+        (utilisation, (-asked * self.mu * per / cosine, self.mu * per))
     }
 
     /// Speeds at the end with this utilisation.
@@ -118,12 +218,24 @@ impl Grip {
         sine + self.load_n + self.inertia * (self.advance * tread - self.speed)
     }
 
-    /// Speed of the tread over the wall beyond its creep, mm/s.
+    /// Speed of the tread over the wall without what winds it up, mm/s.
     #[must_use]
-    pub fn slides(&self, ended: &Ended) -> f64 {
-        let slip = (self.advance * ended.tread - ended.speed).abs();
-        let beyond = slip - SLIDES_FROM * self.creep * self.rolling;
-        if beyond > STANDS_BELOW { beyond } else { 0.0 }
+    pub fn creeps(&self, ended: &Ended, wound: &WindUp) -> f64 {
+        let winds = (wound.mm - self.winding.from_mm) / self.winding.dt_s;
+        ended.tread - ended.speed / self.advance - winds
+    }
+
+    /// The part of it that is beyond creep, mm/s: where all friction is used.
+    #[must_use]
+    pub fn slides(&self, creeps: f64, utilisation: f64, cosine: f64) -> f64 {
+        let beyond = creeps.abs() - 2.0 * self.traction_n(self.mu, cosine) * self.winding.creeps;
+        if utilisation.abs() >= self.mu && beyond > STANDS_BELOW { beyond } else { 0.0 }
+    }
+
+    /// Traction along the wall, N, at this utilisation.
+    #[must_use]
+    pub fn traction_n(&self, utilisation: f64, cosine: f64) -> f64 {
+        utilisation * self.normal * cosine
     }
 }
 
@@ -136,62 +248,21 @@ fn sense_of(speed: f64) -> f64 {
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Used {
     part: f64,
-    /// 1 - part, to full precision.
-    left: f64,
+    /// Square root of what is left of it.
+    root: f64,
 }
 
 impl Used {
-    /// Solves `whole p - lag ln(1 - p) = asked`, none of them negative, to a part of 1e-10.
+    /// Solves `whole p + lag (1 - sqrt(1 - p)) = asked`, none of them negative; from p = 1 on the
+    /// rest slides.
     fn of(asked: f64, whole: f64, lag: f64) -> Self {
-        if lag <= 0.0 {
-            let part = if asked < whole { asked / whole } else { 1.0 };
-            return Self { part, left: 1.0 - part };
+        let left = whole + lag - asked;
+        if left <= 0.0 {
+            return Self { part: 1.0, root: 0.0 };
         }
-        let enough = 1e-10 * asked;
-        // By the first two terms of the logarithm, and once by Newton's method.
-        let first = asked / (whole + lag);
-        let mut part = first - 0.5 * lag * first * first / (whole + lag);
-        if first < 0.9 {
-            for _ in 0..3 {
-                let left = 1.0 - part;
-                let over = whole * part - lag * left.ln() - asked;
-                let change = over * left / (whole * left + lag);
-                part -= change;
-                // What Newton's method leaves, by the second derivative.
-                let rest = 0.5 * lag * (change / left).powi(2);
-                if rest <= enough && (0.0..1.0).contains(&part) {
-                    return Self { part, left: 1.0 - part };
-                }
-            }
-        }
-        Self::slowly(asked, whole, lag, enough)
-    }
-
-    /// The same wherever that fails, from the side from which Newton's method cannot overstep.
-    fn slowly(asked: f64, whole: f64, lag: f64, enough: f64) -> Self {
-        if asked < whole {
-            let mut part = (asked / whole).min(-(-asked / lag).exp_m1());
-            for _ in 0..60 {
-                let left = 1.0 - part;
-                let over = whole * part - lag * left.ln() - asked;
-                if over <= enough {
-                    break;
-                }
-                part -= over * left / (whole * left + lag);
-            }
-            return Self { part, left: 1.0 - part };
-        }
-        // In q, which goes on where p has come to 1.
-        let mut q = ((asked - whole) / lag).max(asked / (whole + lag));
-        for _ in 0..60 {
-            let left = (-q).exp();
-            let short = asked - whole * (1.0 - left) - lag * q;
-            if short <= enough {
-                break;
-            }
-            q += short / (whole * left + lag);
-        }
-        Self { part: -(-q).exp_m1(), left: (-q).exp() }
+        // whole r^2 + lag r = left.
+        let root = 2.0 * left / (lag + (lag * lag + 4.0 * whole * left).sqrt());
+        Self { part: 1.0 - root * root, root }
     }
 }
 

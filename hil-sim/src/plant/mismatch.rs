@@ -63,6 +63,8 @@ pub struct Mismatch {
     /// Spread s of two relaxations of equal share in place of the one at tau: at tau/s and
     /// tau s.
     pub second_relaxation: f64,
+    /// Factor of the tread's tangential stiffness: thickness, and form of the hub.
+    pub tangential_stiffness: f64,
 }
 
 /// A key of [`Mismatch`].
@@ -121,6 +123,7 @@ fields! {
     mode_shape: 1.0, (0.0, 2.0), (0.5, 1.0);
     tread_thickness_mm: 0.0, (0.0, 16.0), (4.0, 12.0);
     second_relaxation: 1.0, (1.0, 10.0), (1.0, 4.0);
+    tangential_stiffness: 1.0, (0.3, 1000.0), (0.6, 1.2);
 }
 
 impl Mismatch {
@@ -178,6 +181,7 @@ impl PlantParameters {
     #[must_use]
     pub fn with_mismatch(mut self, mismatch: &Mismatch) -> Self {
         self.mu *= mismatch.friction;
+        self.tangential_n_per_mm *= mismatch.tread_stiffness * mismatch.tangential_stiffness;
         self.ring = self.ring.with_mismatch(mismatch);
         self.rolling_compression = mismatch.rolling_compression;
         self.wall = self.wall.with_form(Form {

@@ -14,6 +14,7 @@ use super::arm::Mode;
 use super::balance::Balance;
 use super::draw::PlantParameters;
 use super::energy::Energy;
+use super::grip::WindUp;
 use super::ledger::Ledger;
 use super::play::{Pivot, Play};
 use super::ring::Ring;
@@ -100,6 +101,10 @@ pub struct VirtualRig {
     /// Load on the tread by what the elements take up beyond the work of the contact's
     /// resultants, N, signed as its motion.
     inner_load_n: f64,
+    /// Displacement of the tread against the wheel.
+    wind_up: WindUp,
+    /// Length of the contact, mm.
+    contact_mm: f64,
     /// Sliding bodily over the wall.
     sliding: bool,
     /// Held by the stop or latch that carries the load until the drive first turns.
@@ -126,7 +131,7 @@ pub struct VirtualRig {
     drift: f64,
     /// Rise per axial travel beyond that along the step's force: the tread's own compression.
     tread_intake: f64,
-    /// Travel per travel of the tread of a gripping wheel, as far as the tread has taken it up.
+    /// Travel per travel of the tread of a gripping wheel.
     advance: f64,
     /// Rise that no change of load explains while the wheel is at rest, mm/s.
     creep: f64,
@@ -194,6 +199,8 @@ impl VirtualRig {
             },
             energy: Energy::default(),
             inner_load_n: 0.0,
+            wind_up: WindUp::default(),
+            contact_mm: 1.0,
             sliding: false,
             latched: true,
             rolled_mm_s: 0.0,
@@ -335,6 +342,7 @@ impl VirtualRig {
         let (truth, settle_timer, latched) = (self.truth, self.settle_timer, self.latched);
         let (_, cosine, sine) = self.forces;
         let stride = self.predict(drives, dt_s);
+        let wound_mj = self.wind_up.stored_mj(&self.parameters.shear());
         if !stride.tread_mm_s.is_finite() {
             return Err(PlantError::NotFinite { time_s: truth.time_s, name: "tread speed" });
         }
@@ -354,7 +362,7 @@ impl VirtualRig {
             self.roll_steadily(&local, stride, finer)?
         };
         if done {
-            self.book(&truth, (cosine, sine), drives, &stride);
+            self.book(&truth, (cosine, sine), wound_mj, drives, &stride);
         } else {
             (self.truth, self.settle_timer, self.latched) = (truth, settle_timer, latched);
         }

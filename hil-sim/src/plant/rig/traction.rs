@@ -4,7 +4,7 @@
 use super::{Drives, VirtualRig};
 use crate::plant::actuators::Turn;
 use crate::plant::balance::{Axial, Solved};
-use crate::plant::grip::Grip;
+use crate::plant::grip::{Grip, WindUp, Winding};
 use crate::plant::ring::Contact;
 
 /// Carrying less of its friction than this part for radial load, a wheel that spins at an
@@ -13,10 +13,6 @@ const JAMMED_BELOW: f64 = 0.25;
 
 /// Travel over which the wheel's rise is learned, mm.
 const LEARNING_MM: f64 = 1.0;
-
-/// Travel over which a tread takes up another rolling motion, mm: the relaxation length of a
-/// tyre, here much less than the patch.
-const RELAXATION_MM: f64 = 0.1;
 
 /// Largest distance of a stride's end from its prediction, mm.
 const OFF_PREDICTION_MM: f64 = 0.01;
@@ -50,6 +46,7 @@ pub(super) struct Stride {
     predicted: (f64, f64),
     /// An end stop holds the carriage.
     stopped: bool,
+    winding: Winding,
 }
 
 impl Stride {
@@ -96,14 +93,17 @@ impl VirtualRig {
                 p.drive.turn(tread, drives.drive, on, load_n, dt_s)
             }
         };
-        if turn.free_mm_s != 0.0 {
+        if turn.free_mm_s != 0.0 && self.latched {
+            // The latch lets go as the tread takes over the load.
             self.latched = false;
+            self.wind_up = WindUp::steady(&p.shear(), p.load_n, 0.0, self.contact_mm);
         }
         let (normal, cosine, sine) = self.forces;
+        let rolling = self.imposed_speed_mm_s.unwrap_or(tread).abs();
+        let winding = self.wind_up.over(&p.shear(), rolling, self.contact_mm, dt_s);
         let grip = Grip {
             mu: p.mu,
-            creep: p.elastic_creep,
-            rolling: self.imposed_speed_mm_s.unwrap_or(tread).abs(),
+            winding,
             load_n: p.load_n,
             inertia: 1e-3 * p.mass_kg / dt_s,
             speed: self.truth.speed_mm_s,
@@ -111,11 +111,7 @@ impl VirtualRig {
             yields: turn.yields,
             advance: self.rolling_part() * self.advance - self.eccentric().1 / p.ring.radius_mm,
             offset_n: self.offset_load_n(),
-            normal: if cosine > 0.0 {
-                (self.rolling_part() * normal - self.eccentric_lever()) / cosine
-            } else {
-                self.rolling_part()
-            },
+            normal: if cosine > 0.0 { self.lever_n() / cosine } else { self.rolling_part() },
         };
         let predicted = self.predict_speeds(&grip);
         let mut stride = Stride {
@@ -128,6 +124,7 @@ impl VirtualRig {
             turn,
             predicted,
             stopped: false,
+            winding,
         };
         if self.latched {
             return stride;
@@ -197,23 +194,30 @@ impl VirtualRig {
     /// Books the stride with the contact that was found for it.
     pub(super) fn complete(&mut self, stride: &Stride) {
         let (normal, cosine, sine) = self.forces;
+        let used = self.truth.utilisation;
+        let traction_n = match stride.moves {
+            Moves::Driven(grip) => grip.traction_n(used, cosine),
+            _ => used * self.lever_n(),
+        };
+        self.wind_up = stride.winding.end(traction_n);
         let truth = &mut self.truth;
         let before = truth.tread_mm_s;
-        let (mut tread_load_n, mut sliding) = (0.0, 0.0);
+        let (mut tread_load_n, mut creeps, mut sliding) = (0.0, 0.0, 0.0);
         truth.speed_mm_s = 0.0;
         match stride.moves {
             Moves::Latched => truth.tread_mm_s = 0.0,
             Moves::Spins(utilisation) => {
                 truth.tread_mm_s = stride.tread_mm_s;
                 tread_load_n = utilisation * normal;
-                sliding = stride.tread_mm_s.abs();
+                (creeps, sliding) = (stride.tread_mm_s, stride.tread_mm_s.abs());
             }
             Moves::Driven(grip) => {
                 let ended = grip.ended(truth.utilisation, cosine, sine);
                 truth.speed_mm_s = if stride.stopped { 0.0 } else { ended.speed };
                 truth.tread_mm_s = ended.tread;
                 tread_load_n = ended.tread_load_n;
-                sliding = grip.slides(&ended);
+                creeps = grip.creeps(&ended, &self.wind_up);
+                sliding = grip.slides(creeps, used, cosine);
                 self.play.pushed(truth.utilisation * cosine, ended.tread);
             }
             Moves::Free(grip) => {
@@ -236,19 +240,27 @@ impl VirtualRig {
         );
         let rolled = self.mean(before, tread) * stride.dt_s;
         let dt_s = stride.dt_s;
-        let taken_up = -(-rolled.abs() / RELAXATION_MM).exp_m1();
-        self.advance += taken_up * (self.advance() - self.advance);
+        self.advance = self.advance();
+        if std::env::var_os("DBG").is_some() {
+            println!("DBG {:.4} {:.4} {:.4} {:.3} {:.3} {:.4} {:.3} {:.3} {:.4} {:.5}", self.truth.time_s, self.truth.position_mm, self.truth.rotation_rad*25.0, self.truth.speed_mm_s, self.truth.tread_mm_s, self.wind_up.mm, traction_n, self.contact_mm, creeps, self.advance);
+        }
         self.sliding = sliding > 0.0;
         self.tread_load_n = tread_load_n;
         let truth = &mut self.truth;
         truth.slip_mm += sliding * dt_s;
-        let rolls = match stride.moves {
-            Moves::Driven(grip) | Moves::Free(grip) => grip.advance,
-            Moves::Latched | Moves::Spins(_) => 1.0,
-        };
-        let creep = (rolls * truth.tread_mm_s - truth.speed_mm_s).abs() * dt_s;
-        truth.wear_mj += truth.utilisation.abs() * normal * creep;
+        truth.wear_mj += (truth.utilisation * normal * creeps).abs() * dt_s;
         truth.work_mj += (stride.motor_force_n(tread_load_n) * rolled).max(0.0);
+    }
+
+    /// Lever of the friction, as normal force, N: traction is its part by the utilisation.
+    pub(super) fn lever_n(&self) -> f64 {
+        self.rolling_part() * self.forces.0 - self.eccentric_lever()
+    }
+
+    /// The tread wound up as it is in steady rolling against the load.
+    pub(super) fn wind_steadily(&mut self) {
+        let (p, speed) = (&self.parameters, self.truth.tread_mm_s.abs());
+        self.wind_up = WindUp::steady(&p.shear(), self.thrust_n, speed, self.contact_mm);
     }
 
     /// Torque of the normal pressure, as load on the drive, N: of a rim whose axis lies ahead of
