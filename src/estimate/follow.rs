@@ -54,12 +54,10 @@ impl Estimator {
         let event = self.watch.step(&mut state.watch, direction, &seen);
         let on_corner = state.on_corner();
         let (creep, wound) = self.creep.outwards(&self.pulled(state, tick));
-        state.odometry.wind(wound);
+        state.odometry.give_way(tick.sensed.travel, creep, wound);
         let rolling = Rolling {
             radius: tick.sensed.radius.value,
-            lag: self.worn
-                + self.rolling_lag * tick.sensed.compression_filtered
-                + creep * Q16::from_num(direction.sign()),
+            lag: self.worn + self.rolling_lag * tick.sensed.compression_filtered,
             on_corner,
         };
         state.odometry.roll(tick.sensed.travel, &rolling, event.is_some());
@@ -241,7 +239,8 @@ impl Estimator {
         // Of a crossing that began in its middle the wall below was not measured.
         let told = |open: &&mut OpenCrossing| !open.turned && ahead.abs() > self.telling;
         let Some(open) = state.crossing.as_mut().filter(told) else { return };
-        let lost = open.slip.step(sensed.travel, position + ahead.abs());
+        let wound = state.odometry.wound();
+        let lost = open.slip.step(sensed.travel, position + ahead.abs(), wound);
         if lost > Q16::ZERO {
             state.odometry.slip(lost, open.slip.sigma_of(lost));
             state.begin_tick(sensed.travel);
@@ -260,7 +259,7 @@ impl Estimator {
         let table = self.steps.face(open.step);
         let mut seen = position_of_radius(state, sensed) + lift.distance;
         if state.direction == Direction::Retract && !open.turned {
-            let lost = open.slip.end(sensed.travel, seen);
+            let lost = open.slip.end(sensed.travel, seen, state.odometry.wound());
             state.odometry.slip(lost, open.slip.sigma_of(lost));
             state.begin_tick(sensed.travel);
             seen -= lost;
@@ -389,16 +388,25 @@ impl Estimator {
         let (direction, contact) = (state.direction, state.watch.contact);
         let at = state.position;
         let edge = state.extra_face(at).or(self.steps.next_face(at));
-        let edge = edge.filter(|_| contact != Contact::Wall);
-        let slope = edge.map_or(Q16::ZERO, |ahead| match contact {
-            Contact::Both => self.corner().drive_slope(direction, ahead),
-            _ => self.corner().climb(ahead),
+        // A tread that leaves a corner inwards is on the lower wall.
+        let alone = match contact {
+            Contact::Corner => true,
+            Contact::Leaving => direction == Direction::Deploy,
+            Contact::Wall | Contact::Both => false,
+        };
+        let edge = edge.filter(|_| alone || contact == Contact::Both);
+        let slope = edge.map_or(Q16::ZERO, |ahead| {
+            if alone {
+                self.corner().climb(ahead)
+            } else {
+                self.corner().drive_slope(direction, ahead)
+            }
         });
         Pulled {
             pressed: tick.pressed,
             climb: tick.pressed * slope,
             edge,
-            on_wall: matches!(contact, Contact::Wall | Contact::Both),
+            on_wall: !alone,
             compression: tick.sensed.compression_filtered,
             speed: tick.sensed.speed.value,
         }

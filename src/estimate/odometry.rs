@@ -48,8 +48,9 @@ pub struct Odometry {
     share: Ratio,
     gain: Ratio,
     from: Option<Start>,
-    /// By how much the tread is displaced outwards of the axle, once that is known in a run, mm.
-    wound: Option<Millimetres>,
+    /// Travel, and by how much the tread was displaced outwards of the axle there, mm, in the last
+    /// tick of the run.
+    gave: Option<(Travel, Millimetres)>,
 }
 
 impl Default for Odometry {
@@ -63,7 +64,7 @@ impl Default for Odometry {
             share: Ratio::ZERO,
             gain: Ratio::ZERO,
             from: None,
-            wound: None,
+            gave: None,
         }
     }
 }
@@ -98,7 +99,7 @@ impl Odometry {
         *self = Self {
             offset: position.widen().saturating_sub(travel),
             origin: position,
-            wound: self.wound,
+            gave: self.gave,
             ..Self::default()
         };
     }
@@ -132,10 +133,17 @@ impl Odometry {
         sqrt(all.max(Q16::ZERO)) * PLACE
     }
 
-    /// The tread is displaced outwards of the axle by `wound`, mm.
-    pub fn wind(&mut self, wound: Millimetres) {
-        let before = self.wound.replace(wound).unwrap_or(wound);
-        self.offset = self.offset.saturating_sub((wound - before).widen());
+    /// The tread is displaced outwards of the axle by `wound`, mm, and creeps outwards by this part
+    /// of its travel.
+    pub fn give_way(&mut self, travel: Travel, creep: Ratio, wound: Millimetres) {
+        let (from, before) = self.gave.replace((travel, wound)).unwrap_or((travel, wound));
+        let crept = Q16::narrow(travel.saturating_sub(from)).abs() * creep;
+        self.offset = self.offset.saturating_sub((crept + wound - before).widen());
+    }
+
+    /// By how much the tread is displaced outwards of the axle, mm.
+    pub fn wound(&self) -> Millimetres {
+        self.gave.map_or(Millimetres::ZERO, |(_, wound)| wound)
     }
 
     /// The wheel has slipped: the axle is `lost` further in than the tread's travel has it, give or

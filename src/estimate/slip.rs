@@ -13,6 +13,8 @@ const WINDOW: Millimetres = q16(400_000);
 /// chord by a tenth.
 const BEGINS: Ratio = q16(500_000);
 const GOES_ON: Ratio = q16(250_000);
+/// Part of a wound-up tread that the reckoned wind-up may be off by in a window.
+const UNWINDS: Ratio = q16(250_000);
 /// Largest distance that a face seems to move beyond the tread's travel, mm: a window in which the
 /// axle slides back by as much.
 const MOST: Millimetres = q16(800_000);
@@ -43,8 +45,14 @@ pub struct CornerSlip {
 impl CornerSlip {
     /// A tick with this travel of the tread and the face where the corner has it. Returns by how
     /// much the axle is further in than the tread has it, once that is known, mm. The load
-    /// pulls inwards, so nothing slips outwards.
-    pub(super) fn step(&mut self, travel: Travel, face: Millimetres) -> Millimetres {
+    /// pulls inwards, so nothing slips outwards. Of a tread wound up by `wound`, mm, a part may
+    /// unwind in a window.
+    pub(super) fn step(
+        &mut self,
+        travel: Travel,
+        face: Millimetres,
+        wound: Millimetres,
+    ) -> Millimetres {
         let Some((from, was)) = self.from else {
             self.from = Some((travel, face));
             return Q16::ZERO;
@@ -60,7 +68,7 @@ impl CornerSlip {
             return Q16::ZERO;
         }
         let doubtful = moved > turned * GOES_ON;
-        let slips = if self.slipping > 0 { doubtful } else { moved > turned * BEGINS };
+        let slips = if self.slipping > 0 { doubtful } else { moved > turned * BEGINS + wound * UNWINDS };
         let lost = match (slips, self.slipping) {
             (true, 0) => moved + self.doubtful,
             (true, _) => moved,
@@ -74,13 +82,19 @@ impl CornerSlip {
     }
 
     /// The corner no longer shows the place: what the window that is cut off has of slip, mm. In
-    /// the last milliseconds before it touches down a wheel that holds back a load slips first.
-    pub(super) fn end(&mut self, travel: Travel, face: Millimetres) -> Millimetres {
+    /// the last milliseconds before it touches down a wheel that holds back a load slips first; as
+    /// it does, its tread unwinds.
+    pub(super) fn end(
+        &mut self,
+        travel: Travel,
+        face: Millimetres,
+        wound: Millimetres,
+    ) -> Millimetres {
         let Some((from, was)) = self.from.take() else { return Q16::ZERO };
         let turned = Q16::narrow(travel.saturating_sub(from)).abs();
         let moved = face - was + self.doubtful;
         let part = if self.slipping > 0 { GOES_ON } else { BEGINS };
-        let slips = moved > SEEN + turned * part && moved <= turned + MOST;
+        let slips = moved > SEEN + turned * part + wound && moved <= turned + MOST;
         let lost = if slips { moved } else { Q16::ZERO };
         self.lost += lost;
         lost
@@ -123,7 +137,7 @@ mod tests {
             let slipped = (turned - at).clamp(0.0, slip);
             let jitter = noise * f64::from(tick * 7919 % 101 - 50) / 50.0;
             let face = 20.0 + slipped - taken + drift * turned + jitter;
-            taken += watch.step(Travel::from_num(turned), Q16::from_num(face)).to_num::<f64>();
+            taken += watch.step(Travel::from_num(turned), Q16::from_num(face), Q16::ZERO).to_num::<f64>();
         }
         assert_eq!(watch.lost.to_num::<f64>(), taken);
         taken

@@ -132,7 +132,7 @@ impl Driven {
             ..Drives::default()
         };
         let before = self.screw.seat_n();
-        self.screw.step(drives.preload, true, TICK_S);
+        self.screw.step(drives.preload, true, 0.0, TICK_S);
         self.screw_rate = (self.screw.seat_n() - before) / TICK_S;
         self.plant.step(&drives, TICK_S)?;
         self.tick += 1;

@@ -145,6 +145,9 @@ pub struct Pretightener {
     range: (f64, f64),
     /// Step, s, and what the lag keeps over it.
     decay: (f64, f64),
+    /// Part of its speed that a newton takes that it raises, and of full duty that friction takes.
+    droop_per_n: f64,
+    friction: f64,
 }
 
 impl Pretightener {
@@ -167,12 +170,23 @@ impl Pretightener {
             pipeline: std::iter::repeat_n(0.0, depth).collect(),
             range,
             decay: (dt_s, (-dt_s / lag).exp()),
+            droop_per_n: 0.0,
+            friction: 0.0,
         }
     }
 
-    /// Advances by the step at `duty` (-1 to 1); a disabled bridge leaves the screw
-    /// self-locked, at once.
-    pub fn step(&mut self, duty: f64, enabled: bool, dt_s: f64) {
+    /// The same with a motor whose speed falls by this part per newton that it raises, and with
+    /// friction that takes this part of full duty. At `limit_n` it still gives its slew.
+    #[must_use]
+    pub fn with_losses(mut self, droop_per_n: f64, friction: f64, limit_n: f64) -> Self {
+        (self.droop_per_n, self.friction) = (droop_per_n, friction);
+        self.slew /= 1.0 - droop_per_n * limit_n - friction;
+        self
+    }
+
+    /// Advances by the step at `duty` (-1 to 1) against `force_n`; a disabled bridge leaves the
+    /// screw self-locked, at once. It locks itself: what presses does not drive it down.
+    pub fn step(&mut self, duty: f64, enabled: bool, force_n: f64, dt_s: f64) {
         self.pipeline.push_back(if enabled { duty.clamp(-1.0, 1.0) } else { 0.0 });
         let delayed = self.pipeline.pop_front().unwrap_or(0.0);
         if !enabled {
@@ -180,7 +194,9 @@ impl Pretightener {
             return;
         }
         // Exact for the lag under a held command.
-        let target = delayed * self.slew;
+        let raised_n = if delayed > 0.0 { force_n } else { 0.0 };
+        let lost = self.friction + self.droop_per_n * raised_n;
+        let target = (delayed.abs() - lost).max(0.0).copysign(delayed) * self.slew;
         if self.decay.0 != dt_s {
             self.decay = (dt_s, (-dt_s / self.lag).exp());
         }
@@ -321,20 +337,20 @@ mod tests {
     fn the_screw_keeps_within_its_ends_and_when_switched_off() {
         let mut screw = Pretightener::new(25.0, 0.06, 0.0, 1e-3, 10.0, (-5.0, 12.0));
         for _ in 0..1000 {
-            screw.step(1.0, true, 1e-3);
+            screw.step(1.0, true, 0.0, 1e-3);
         }
         assert_eq!(screw.seat_n(), 12.0);
         for _ in 0..100 {
-            screw.step(-1.0, true, 1e-3);
+            screw.step(-1.0, true, 0.0, 1e-3);
         }
         let held = screw.seat_n();
         assert!(held < 12.0);
         for _ in 0..100 {
-            screw.step(-1.0, false, 1e-3);
+            screw.step(-1.0, false, 0.0, 1e-3);
         }
         assert_eq!(screw.seat_n(), held);
         for _ in 0..2000 {
-            screw.step(-1.0, true, 1e-3);
+            screw.step(-1.0, true, 0.0, 1e-3);
         }
         assert_eq!(screw.seat_n(), -5.0);
     }
@@ -344,7 +360,7 @@ mod tests {
         let mut screw = Pretightener::new(25.0, 0.06, 0.08, 1e-3, 0.0, (0.0, 60.0));
         let mut at = Vec::new();
         for _ in 0..1000 {
-            screw.step(1.0, true, 1e-3);
+            screw.step(1.0, true, 0.0, 1e-3);
             at.push(screw.seat_n());
         }
         assert_eq!(at[79], 0.0);

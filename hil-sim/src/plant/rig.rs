@@ -170,6 +170,9 @@ impl VirtualRig {
             seat,
             range,
         );
+        let p = &parameters;
+        let droop_per_n = p.screw_droop / p.preload_limit_n;
+        let preload = preload.with_losses(droop_per_n, p.screw_friction, p.preload_limit_n);
         let modes = parameters.modes.iter().map(|&mode| Mode::new(mode)).collect();
         let mut rig = Self {
             resolution: Resolution::default(),
@@ -281,7 +284,7 @@ impl VirtualRig {
     pub fn step(&mut self, drives: &Drives, dt_s: f64) -> Result<(), PlantError> {
         let [drive, preload] = drives.worked();
         let worked = &Drives { drive, preload, ..*drives };
-        self.preload.step(preload, drives.preload_on, dt_s);
+        self.preload.step(preload, drives.preload_on, self.truth.preload_n, dt_s);
         let mut left_s = dt_s;
         while left_s > 0.0 {
             let distance = self.farthest(left_s);

@@ -102,7 +102,7 @@ impl VirtualRig {
         let rolling = self.imposed_speed_mm_s.unwrap_or(tread).abs();
         let winding = self.wind_up.over(&p.shear(), rolling, self.contact_mm, dt_s);
         let grip = Grip {
-            mu: p.mu,
+            mu: p.friction_at(self.truth.position_mm),
             winding,
             load_n: p.load_n,
             inertia: 1e-3 * p.mass_kg / dt_s,
@@ -143,7 +143,7 @@ impl VirtualRig {
         let position = self.truth.position_mm + stride.travel_mm;
         if position < low || position > high {
             stride.travel_mm = position.clamp(low, high) - self.truth.position_mm;
-            let friction = p.mu.copysign(grip.tread);
+            let friction = grip.mu.copysign(grip.tread);
             let slower = grip.tread - grip.yields * friction * normal;
             // The wheel spins, and presses itself in by what it pushes with; or it stands.
             let spins = slower * grip.tread > 0.0 && self.freedom(friction) >= JAMMED_BELOW;
