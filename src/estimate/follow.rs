@@ -394,7 +394,8 @@ impl Estimator {
             Contact::Leaving => direction == Direction::Deploy,
             Contact::Wall | Contact::Both => false,
         };
-        let edge = edge.filter(|_| alone || contact == Contact::Both);
+        let within = self.corner().first_contact(Direction::Deploy);
+        let edge = edge.filter(|ahead| (alone || contact == Contact::Both) && *ahead < within);
         let slope = edge.map_or(Q16::ZERO, |ahead| {
             if alone {
                 self.corner().climb(ahead)
@@ -406,7 +407,7 @@ impl Estimator {
             pressed: tick.pressed,
             climb: tick.pressed * slope,
             edge,
-            on_wall: !alone,
+            on_wall: !alone || edge.is_none(),
             compression: tick.sensed.compression_filtered,
             speed: tick.sensed.speed.value,
         }

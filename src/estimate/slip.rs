@@ -68,7 +68,8 @@ impl CornerSlip {
             return Q16::ZERO;
         }
         let doubtful = moved > turned * GOES_ON;
-        let slips = if self.slipping > 0 { doubtful } else { moved > turned * BEGINS + wound * UNWINDS };
+        let slips =
+            if self.slipping > 0 { doubtful } else { moved > turned * BEGINS + wound * UNWINDS };
         let lost = match (slips, self.slipping) {
             (true, 0) => moved + self.doubtful,
             (true, _) => moved,
@@ -137,7 +138,9 @@ mod tests {
             let slipped = (turned - at).clamp(0.0, slip);
             let jitter = noise * f64::from(tick * 7919 % 101 - 50) / 50.0;
             let face = 20.0 + slipped - taken + drift * turned + jitter;
-            taken += watch.step(Travel::from_num(turned), Q16::from_num(face), Q16::ZERO).to_num::<f64>();
+            taken += watch
+                .step(Travel::from_num(turned), Q16::from_num(face), Q16::ZERO)
+                .to_num::<f64>();
         }
         assert_eq!(watch.lost.to_num::<f64>(), taken);
         taken

@@ -356,6 +356,21 @@ mod tests {
     }
 
     #[test]
+    fn at_the_limit_the_screw_has_its_slew_and_below_it_is_faster() {
+        let rate = |duty: f64, force_n: f64| {
+            let screw = Pretightener::new(25.0, 0.06, 0.0, 1e-3, 0.0, (-1e6, 1e6));
+            let mut screw = screw.with_losses(0.2 / 50.0, 0.05, 50.0);
+            (0..1000).for_each(|_| screw.step(duty, true, force_n, 1e-3));
+            screw.rate
+        };
+        assert!((rate(1.0, 50.0) - 25.0).abs() < 1e-4);
+        assert!((rate(1.0, 0.0) - 25.0 * 0.95 / 0.75).abs() < 1e-4);
+        // Down it does not raise; a small duty moves nothing.
+        assert!((rate(-1.0, 50.0) + 25.0 * 0.95 / 0.75).abs() < 1e-4);
+        assert_eq!((rate(0.04, 0.0), rate(-0.04, 50.0), rate(0.2, 50.0)), (0.0, 0.0, 0.0));
+    }
+
+    #[test]
     fn the_screw_waits_lags_and_slews() {
         let mut screw = Pretightener::new(25.0, 0.06, 0.08, 1e-3, 0.0, (0.0, 60.0));
         let mut at = Vec::new();

@@ -247,6 +247,7 @@ impl Balance {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::plant::grip::{Shear, WindUp};
     use crate::plant::ring::RingParameters;
     use crate::plant::wall::{Step, Wall};
 
@@ -273,10 +274,10 @@ mod tests {
 
     /// A wheel that has just met a corner and loses speed against it.
     fn carried(load_n: f64) -> Grip {
+        let shear = Shear { n_per_mm: 21.0, stiffening: 4.2235, relaxations_s: [0.1059; 2] };
         Grip {
             mu: 0.9,
-            creep: 0.01,
-            rolling: 8.0,
+            winding: WindUp::default().over(&shear, 8.0, 6.0, 1e-3),
             load_n,
             inertia: 1.0,
             speed: 8.0,

@@ -251,6 +251,16 @@ mod tests {
     }
 
     #[test]
+    fn friction_waves_along_the_wall_about_its_mean() {
+        let mismatch =
+            Mismatch { friction_waviness: 0.1, friction_wave_mm: 20.0, ..Mismatch::default() };
+        let plant = Scenario::default().plant().with_mismatch(&mismatch);
+        for (position_mm, part) in [(0.0, 1.0), (5.0, 1.1), (10.0, 1.0), (35.0, 0.9)] {
+            assert!((plant.friction_at(position_mm) / plant.mu - part).abs() < 1e-12);
+        }
+    }
+
+    #[test]
     fn the_wide_draw_fills_its_ranges_and_keeps_what_was_set() {
         let set = Mismatch { backlash_mm: 0.4, ..Mismatch::default() };
         let draws: Vec<Mismatch> = (1..=500).map(|seed| set.draw(seed, &[])).collect();
