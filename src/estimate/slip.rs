@@ -169,7 +169,7 @@ mod tests {
         let lost: f64 = (0..100)
             .map(|tick| {
                 let face = Q16::from_num(20.0 + 0.01 * f64::from(tick)) - watch.lost;
-                watch.step(Travel::ZERO, face).to_num::<f64>()
+                watch.step(Travel::ZERO, face, Q16::ZERO).to_num::<f64>()
             })
             .sum();
         assert!(watch.is_slipping() && (0.59..1.0).contains(&lost), "{lost}");

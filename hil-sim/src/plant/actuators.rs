@@ -196,7 +196,8 @@ impl Pretightener {
         // Exact for the lag under a held command.
         let raised_n = if delayed > 0.0 { force_n } else { 0.0 };
         let lost = self.friction + self.droop_per_n * raised_n;
-        let target = (delayed.abs() - lost).max(0.0).copysign(delayed) * self.slew;
+        let left = delayed.abs() - lost;
+        let target = if left < 0.0 { 0.0 } else { left.copysign(delayed) * self.slew };
         if self.decay.0 != dt_s {
             self.decay = (dt_s, (-dt_s / self.lag).exp());
         }

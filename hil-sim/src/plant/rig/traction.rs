@@ -241,21 +241,6 @@ impl VirtualRig {
         let rolled = self.mean(before, tread) * stride.dt_s;
         let dt_s = stride.dt_s;
         self.advance = self.advance();
-        if std::env::var_os("DBG").is_some() {
-            println!(
-                "DBG {:.4} {:.4} {:.4} {:.3} {:.3} {:.4} {:.3} {:.3} {:.4} {:.5}",
-                self.truth.time_s,
-                self.truth.position_mm,
-                self.truth.rotation_rad * 25.0,
-                self.truth.speed_mm_s,
-                self.truth.tread_mm_s,
-                self.wind_up.mm,
-                traction_n,
-                self.contact_mm,
-                creeps,
-                self.advance
-            );
-        }
         self.sliding = sliding > 0.0;
         self.tread_load_n = tread_load_n;
         let truth = &mut self.truth;
