@@ -425,7 +425,8 @@ impl Estimator {
     /// A step found by a search on the way down is the one above the wall that the arm shows behind
     /// it: between walls, steps off their heights might have been taken for another level.
     fn count_down(&self, state: &mut EstimateState, sensed: &SensedState, open: &mut OpenCrossing) {
-        let level = sensed.steps_up.round().clamp(0, i32::from(self.steps.count().saturating_sub(1))) as u8;
+        let level =
+            sensed.steps_up.round().clamp(0, i32::from(self.steps.count().saturating_sub(1))) as u8;
         state.level = level;
         state.next_step = level;
         open.step = level + 1;
@@ -456,7 +457,8 @@ impl Estimator {
     /// Whether the wheel has left the corner of the last step behind.
     fn clear_of(&self, state: &EstimateState, sensed: &SensedState) -> bool {
         let landed = |open: &OpenCrossing| open.landing.map(|landing| landing.face);
-        let lifted = |open: &OpenCrossing| open.lift.map(|point| landed(open).unwrap_or(point.face));
+        let lifted =
+            |open: &OpenCrossing| open.lift.map(|point| landed(open).unwrap_or(point.face));
         let followed = state.crossing.as_ref().and_then(lifted);
         let Some(face) = followed.or(state.leaving) else { return true };
         let nominal = self.corner().first_contact(state.direction.opposite());

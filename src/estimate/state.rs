@@ -1,8 +1,8 @@
 //! What the estimator remembers between ticks, and what it reports of one.
 
 use super::crossing::{Contact, WatchState};
-use super::landing::{Landing, Slide};
 use super::crossing_speed::CrossingSpeed;
+use super::landing::{Landing, Slide};
 use super::odometry::Odometry;
 use super::tread::{Shown, TreadState};
 use super::{CornerSlip, Place, Position, PositionConfidence};
