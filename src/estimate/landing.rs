@@ -16,7 +16,9 @@ use crate::units::{Millimetres, Q16, Ratio, Travel, q16};
 const MOVES: Ratio = q16(250_000);
 /// Least slide by the largest compression, mm: what the arm's code makes of an edge's place, three
 /// deviations.
-const SLID: Millimetres = q16(90_000);
+const SHOWN: Millimetres = q16(90_000);
+/// Least slide in all, mm: two sigma of what it is off by, with the reading's own.
+const SLID: Millimetres = q16(300_000);
 /// Distance by which the face has moved inwards once the wheel has landed, mm.
 const LANDED: Millimetres = q16(200_000);
 /// Part that the largest compression has in the slide; the rest has the compression as read. A tread
@@ -124,12 +126,13 @@ impl Slide {
         let by_largest = end.by_largest - begin.by_largest;
         let as_read = end.as_read - begin.as_read;
         let face = begin.position;
-        if by_largest <= SLID {
-            return Some(Landing { face, slid: Q16::ZERO, lost: Q16::ZERO });
-        }
         let less = (by_largest - as_read) * BY_LARGEST;
         let on = (as_read + less) * GOES_ON;
-        Some(Landing { face, slid: as_read + less + on, lost: end.position - face + less + on })
+        let slid = as_read + less + on;
+        if by_largest <= SHOWN || slid <= SLID {
+            return Some(Landing { face, slid: Q16::ZERO, lost: Q16::ZERO });
+        }
+        Some(Landing { face, slid, lost: end.position - face + less + on })
     }
 }
 
