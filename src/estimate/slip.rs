@@ -11,7 +11,7 @@ const WINDOW: Millimetres = q16(400_000);
 /// Part of it that the face must seem to move, for a slip to begin and to go on. A step 0.5 mm
 /// off its table's height, or a sensor of the mean compression, moves it by a third, creep and
 /// chord by a tenth.
-const BEGINS: Ratio = q16(750_000);
+const BEGINS: Ratio = q16(650_000);
 const GOES_ON: Ratio = q16(500_000);
 /// Largest distance that a face seems to move beyond the tread's travel, mm: a window in which the
 /// axle slides back by as much.
