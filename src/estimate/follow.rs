@@ -201,7 +201,7 @@ impl Estimator {
         state.crossing = Some(OpenCrossing {
             step: if belongs { state.next_step } else { 0 },
             direction: state.direction,
-            expected: belongs && !searching && expectation != Expectation::Ahead,
+            expected: belongs && (searching || expectation != Expectation::Ahead),
             reported: expectation == Expectation::Ahead || state.late,
             touched_at: tick.now,
             standing_since: tick.standing_since,
