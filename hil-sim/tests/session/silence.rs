@@ -1,0 +1,143 @@
+//! What the controller was not told: friction, load, heights. It arrives where it should, or says
+//! what is wrong.
+
+use std::time::{SystemTime, UNIX_EPOCH};
+
+use hil_sim::montecarlo;
+use hil_sim::record::Summary;
+use hil_sim::scenario::{Direction, Scenario};
+use hil_sim::session::{Options, run};
+use hil_sim::testing::long;
+use interstage::fault::Limit;
+
+use crate::common::DIRECTIONS;
+
+fn scenario(sets: &[&str], direction: Direction) -> Scenario {
+    let sets: Vec<String> = sets.iter().map(|set| (*set).to_owned()).collect();
+    let mut scenario = Scenario::resolve(None, None, &sets).expect("a sound scenario");
+    scenario.run.direction = direction;
+    scenario
+}
+
+fn ran(sets: &[&str], direction: Direction) -> Summary {
+    run(&scenario(sets, direction), Options::default()).expect("a run").summary
+}
+
+/// Time of a run that completes, s.
+fn duration_s(sets: &[&str], direction: Direction) -> f64 {
+    let summary = ran(sets, direction);
+    assert!(summary.completed, "{sets:?} {:?}", summary.faults);
+    summary.duration_s.expect("completed")
+}
+
+/// Seeds of the runs that are wrong and do not say so.
+fn unreported(scenario: &Scenario, seeds: &[u64]) -> Vec<u64> {
+    let lines = montecarlo::run(scenario, seeds, &|| {}).expect("runs");
+    lines.iter().filter(|line| line.unreported).map(|line| line.seed).collect()
+}
+
+/// Runs that were wrong and said nothing: slides before a landing, slips that were none, steps off
+/// their height on the way down, a wall taken for a corner.
+#[test]
+fn what_was_wrong_in_silence_is_reported() {
+    let found: [(Direction, &[u64]); 2] = [
+        (Direction::Deploy, &[30084, 30160, 40195, 61199]),
+        (Direction::Retract, &[1003, 1004, 1026, 1028, 1042, 1044, 1050, 1058, 1092, 1100, 1131]),
+    ];
+    for (direction, seeds) in found {
+        let adversarial = scenario(&["run.mismatch=adversarial"], direction);
+        assert_eq!(unreported(&adversarial, seeds), [0; 0], "{direction:?}");
+    }
+}
+
+#[test]
+fn an_unknown_friction_is_no_secret() {
+    let (parts, seeds): (Vec<u32>, Vec<u64>) = if long() {
+        ((64..=87).collect(), (200_001..=200_020).collect())
+    } else {
+        (vec![66, 72, 78], vec![0])
+    };
+    for direction in DIRECTIONS {
+        for part in &parts {
+            let set = format!("mismatch.friction=0.{part}");
+            assert_eq!(
+                unreported(&scenario(&[&set], direction), &seeds),
+                [0; 0],
+                "{set} {direction:?}"
+            );
+        }
+    }
+}
+
+/// Fresh seeds at each call.
+#[test]
+fn adversarial_rigs_are_hardly_ever_wrong_in_silence() {
+    if !long() {
+        return;
+    }
+    let now = SystemTime::now().duration_since(UNIX_EPOCH).expect("after 1970").as_secs();
+    let seeds: Vec<u64> = (1..=1000).map(|seed| now * 1000 + seed).collect();
+    for direction in DIRECTIONS {
+        let adversarial = scenario(&["run.mismatch=adversarial"], direction);
+        let wrong = unreported(&adversarial, &seeds);
+        eprintln!("{direction:?}, seeds from {}: unreported {wrong:?}", seeds[0]);
+        assert!(wrong.len() <= 5, "{direction:?}: {wrong:?}");
+    }
+}
+
+/// A load that the drive shows is not taken for a stiff tread.
+#[test]
+fn with_an_unknown_load_no_other_strategy_is_faster() {
+    for weight in ["3.3", "5", "6.7", "8.3"] {
+        let set = format!("mismatch.weight_n={weight}");
+        let ours = duration_s(&[&set], Direction::Deploy);
+        let limit = duration_s(&[&set, "run.controller=limit"], Direction::Deploy);
+        assert!(ours <= 1.03 * limit, "{weight} N: {ours} s, limit {limit} s");
+    }
+}
+
+/// What the first gaps show is learned in both directions.
+#[test]
+fn a_tread_that_relaxes_faster_than_known_is_crossed_faster() {
+    let took_s = duration_s(&["mismatch.tread_tau=0.3"], Direction::Deploy);
+    assert!(took_s < 5.2, "{took_s}");
+}
+
+/// Margin that is worth little is not bought with time.
+#[test]
+fn a_little_less_friction_costs_a_little_more_time() {
+    let took_s = |mu| duration_s(&[&format!("plant.mu={mu}")], Direction::Retract);
+    let (enough, less) = (took_s("0.83"), took_s("0.80"));
+    assert!(less < 1.6 * enough, "{enough} s, {less} s");
+}
+
+/// Steps off their height are measured, and so are the gaps at them.
+#[test]
+fn heights_off_the_table_do_not_hide_a_gap() {
+    let off = |by: &str| {
+        let steps = [1, 2, 3].map(|n| format!("{{kind=\"higher\",step={n},offset_mm={by}}}"));
+        format!("run.anomalies=[{}]", steps.join(","))
+    };
+    for direction in DIRECTIONS {
+        for by in ["0.13", "0.2"] {
+            let summary = ran(&[&off(by)], direction);
+            let reported = |limit: Limit| summary.limits.iter().any(|l| l.code == limit.code());
+            assert!(summary.completed && reported(Limit::StepHeight), "{direction:?} {by}");
+            for line in &summary.crossings {
+                let measured = line.gap_measured_mm.expect("measured");
+                assert!((measured / line.gap_mm - 1.0).abs() < 0.03, "{by} {}", line.index);
+                let wide = measured > 1.03 * summary.gap_ref_mm;
+                assert!(!wide || reported(Limit::GapWide), "{direction:?} {by} {}", line.index);
+            }
+        }
+    }
+}
+
+/// The first step of a retraction, for which nothing is known of the tread, teaches the next.
+#[test]
+fn the_first_drop_of_a_thick_tread_teaches_the_second() {
+    let summary =
+        ran(&["mismatch.tread_thickness_mm=10", "mismatch.tread_tau=2"], Direction::Retract);
+    let parts: Vec<f64> = summary.crossings.iter().map(|c| c.gap_mm / summary.gap_ref_mm).collect();
+    assert!(parts.len() == 3 && parts[1..].iter().all(|part| *part <= 1.06), "{parts:?}");
+}
