@@ -223,7 +223,7 @@ mod tests {
             let seats = seat(&samples, delay, lag);
             for (n, sample) in samples.iter().enumerate() {
                 prop_assert!((slew * seats[n] - screw.seat_n()).abs() < 1e-9, "{n}");
-                screw.step(sample.pretightener, sample.pretightener_on, TICK_S);
+                screw.step(sample.pretightener, sample.pretightener_on, 0.0, TICK_S);
             }
         }
     }

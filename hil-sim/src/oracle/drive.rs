@@ -45,7 +45,8 @@ impl Driven {
         let p = plant.parameters();
         let rise = plant.truth().height_mm - p.ring.radius_mm;
         let seat = plant.truth().preload_n - p.spring_n_per_mm * rise;
-        let screw = Pretightener::new(p.slew_n_per_s, p.lag_s, 0.0, TICK_S, seat, limits.screw_n);
+        let screw = Pretightener::new(p.slew_n_per_s, p.lag_s, 0.0, TICK_S, seat, limits.screw_n)
+            .with_losses(p.screw_droop, p.screw_friction, p.preload_limit_n);
         Self {
             limits,
             screw,
@@ -132,7 +133,7 @@ impl Driven {
             ..Drives::default()
         };
         let before = self.screw.seat_n();
-        self.screw.step(drives.preload, true, TICK_S);
+        self.screw.step(drives.preload, true, self.plant.truth().preload_n, TICK_S);
         self.screw_rate = (self.screw.seat_n() - before) / TICK_S;
         self.plant.step(&drives, TICK_S)?;
         self.tick += 1;

@@ -145,6 +145,10 @@ pub struct Pretightener {
     range: (f64, f64),
     /// Step, s, and what the lag keeps over it.
     decay: (f64, f64),
+    /// Part of its speed that each newton takes which it raises, 1/N.
+    droop_per_n: f64,
+    /// Part of full duty that friction takes.
+    friction: f64,
 }
 
 impl Pretightener {
@@ -167,12 +171,23 @@ impl Pretightener {
             pipeline: std::iter::repeat_n(0.0, depth).collect(),
             range,
             decay: (dt_s, (-dt_s / lag).exp()),
+            droop_per_n: 0.0,
+            friction: 0.0,
         }
     }
 
-    /// Advances by the step at `duty` (-1 to 1); a disabled bridge leaves the screw
-    /// self-locked, at once.
-    pub fn step(&mut self, duty: f64, enabled: bool, dt_s: f64) {
+    /// The same with a motor whose speed falls by the part `droop` as it raises `limit_n`, and
+    /// with friction that takes this part of full duty. At `limit_n` it still gives its slew.
+    #[must_use]
+    pub fn with_losses(mut self, droop: f64, friction: f64, limit_n: f64) -> Self {
+        (self.droop_per_n, self.friction) = (droop / limit_n, friction);
+        self.slew /= 1.0 - droop - friction;
+        self
+    }
+
+    /// Advances by the step at `duty` (-1 to 1) against `force_n`; a disabled bridge leaves the
+    /// screw self-locked, at once. It locks itself: what presses does not drive it down.
+    pub fn step(&mut self, duty: f64, enabled: bool, force_n: f64, dt_s: f64) {
         self.pipeline.push_back(if enabled { duty.clamp(-1.0, 1.0) } else { 0.0 });
         let delayed = self.pipeline.pop_front().unwrap_or(0.0);
         if !enabled {
@@ -180,7 +195,10 @@ impl Pretightener {
             return;
         }
         // Exact for the lag under a held command.
-        let target = delayed * self.slew;
+        let raised_n = if delayed > 0.0 { force_n } else { 0.0 };
+        let lost = self.friction + self.droop_per_n * raised_n;
+        let left = delayed.abs() - lost;
+        let target = if left < 0.0 { 0.0 } else { left.copysign(delayed) * self.slew };
         if self.decay.0 != dt_s {
             self.decay = (dt_s, (-dt_s / self.lag).exp());
         }
@@ -321,22 +339,37 @@ mod tests {
     fn the_screw_keeps_within_its_ends_and_when_switched_off() {
         let mut screw = Pretightener::new(25.0, 0.06, 0.0, 1e-3, 10.0, (-5.0, 12.0));
         for _ in 0..1000 {
-            screw.step(1.0, true, 1e-3);
+            screw.step(1.0, true, 0.0, 1e-3);
         }
         assert_eq!(screw.seat_n(), 12.0);
         for _ in 0..100 {
-            screw.step(-1.0, true, 1e-3);
+            screw.step(-1.0, true, 0.0, 1e-3);
         }
         let held = screw.seat_n();
         assert!(held < 12.0);
         for _ in 0..100 {
-            screw.step(-1.0, false, 1e-3);
+            screw.step(-1.0, false, 0.0, 1e-3);
         }
         assert_eq!(screw.seat_n(), held);
         for _ in 0..2000 {
-            screw.step(-1.0, true, 1e-3);
+            screw.step(-1.0, true, 0.0, 1e-3);
         }
         assert_eq!(screw.seat_n(), -5.0);
+    }
+
+    #[test]
+    fn at_the_limit_the_screw_has_its_slew_and_below_it_is_faster() {
+        let rate = |duty: f64, force_n: f64| {
+            let screw = Pretightener::new(25.0, 0.06, 0.0, 1e-3, 0.0, (-1e6, 1e6));
+            let mut screw = screw.with_losses(0.2, 0.05, 50.0);
+            (0..1000).for_each(|_| screw.step(duty, true, force_n, 1e-3));
+            screw.rate
+        };
+        assert!((rate(1.0, 50.0) - 25.0).abs() < 1e-4);
+        assert!((rate(1.0, 0.0) - 25.0 * 0.95 / 0.75).abs() < 1e-4);
+        // Down it does not raise; a small duty moves nothing.
+        assert!((rate(-1.0, 50.0) + 25.0 * 0.95 / 0.75).abs() < 1e-4);
+        assert_eq!((rate(0.04, 0.0), rate(-0.04, 50.0), rate(0.2, 50.0)), (0.0, 0.0, 0.0));
     }
 
     #[test]
@@ -344,7 +377,7 @@ mod tests {
         let mut screw = Pretightener::new(25.0, 0.06, 0.08, 1e-3, 0.0, (0.0, 60.0));
         let mut at = Vec::new();
         for _ in 0..1000 {
-            screw.step(1.0, true, 1e-3);
+            screw.step(1.0, true, 0.0, 1e-3);
             at.push(screw.seat_n());
         }
         assert_eq!(at[79], 0.0);

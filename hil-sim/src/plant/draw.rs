@@ -33,8 +33,10 @@ pub struct PlantParameters {
     pub wall_radius_mm: f64,
     /// Travel between the end stops, mm.
     pub stops_mm: (f64, f64),
-    /// Friction of tread on wall.
+    /// Friction of tread on wall, its mean.
     pub mu: f64,
+    /// Amplitude of its waves along the wall over its mean, and their length, mm.
+    pub friction_waves: (f64, f64),
     /// Creepage at 63 % of friction.
     pub elastic_creep: f64,
     /// Part of the compression by which the rolling radius is less than the undeformed one.
@@ -53,6 +55,12 @@ pub struct PlantParameters {
     pub lag_s: f64,
     /// Dead time of the screw, s.
     pub delay_s: f64,
+    /// Part of the screw's speed that raising the preload limit takes.
+    pub screw_droop: f64,
+    /// Part of full duty that the screw's friction takes.
+    pub screw_friction: f64,
+    /// Preload limit, N.
+    pub preload_limit_n: f64,
     /// Largest force of the screw's position, N.
     pub seat_max_n: f64,
     /// Modes of the arm.
@@ -124,6 +132,13 @@ impl Draw {
 }
 
 impl PlantParameters {
+    /// Friction of tread on wall at a position, mm.
+    #[must_use]
+    pub fn friction_at(&self, position_mm: f64) -> f64 {
+        let (amplitude, length_mm) = self.friction_waves;
+        self.mu * (1.0 + amplitude * (std::f64::consts::TAU * position_mm / length_mm).sin())
+    }
+
     /// The plant of a seed: `rig` with this spread, and with these steps, each its position
     /// and how much higher than the table says it is, mm. Seed 0 is the nominal rig without
     /// mismatch; its sensors still quantise and have their noise.
@@ -188,6 +203,7 @@ impl PlantParameters {
             wall_radius_mm: rig.rig.wall_radius_mm,
             stops_mm: (-STOP_ROOM_MM, rig.rig.travel_mm + STOP_ROOM_MM),
             mu,
+            friction_waves: (0.0, 22.0),
             elastic_creep: rig.plant.elastic_creep,
             rolling_compression: 1.0 / 3.0,
             load_n: load,
@@ -203,6 +219,9 @@ impl PlantParameters {
             slew_n_per_s,
             lag_s,
             delay_s,
+            screw_droop: 0.0,
+            screw_friction: 0.0,
+            preload_limit_n: rig.preload.limit_n,
             seat_max_n: 1.25 * rig.preload.limit_n,
             modes: rig.drive.modes_hz.iter().map(|&hz| ModeParameters::at(hz)).collect(),
             ripple: (0.006 * rig.drive.force_limit_n, rig.drive.ripple_pitch_mm),

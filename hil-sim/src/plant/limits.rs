@@ -131,8 +131,8 @@ impl PlantParameters {
         let (mass_kg, speed_mm_s) = (self.mass_kg, self.drive.no_load_mm_s);
         let energy_mj = 0.5e-3 * mass_kg * speed_mm_s * speed_mm_s;
         let most_mj = takes(&self.ring, step_mm);
-        if self.mu * tangent >= 1.0 && energy_mj > most_mj {
-            let mu = self.mu;
+        let mu = self.mu * (1.0 + self.friction_waves.0);
+        if mu * tangent >= 1.0 && energy_mj > most_mj {
             return Err(Refusal::Digs { mu, tangent, mass_kg, speed_mm_s, energy_mj, most_mj });
         }
         Ok(())

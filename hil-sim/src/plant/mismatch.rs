@@ -63,6 +63,16 @@ pub struct Mismatch {
     /// Spread s of two relaxations of equal share in place of the one at tau: at tau/s and
     /// tau s.
     pub second_relaxation: f64,
+    /// Part of the pre-tightener's speed that raising the preload limit takes: its motor has that
+    /// part of its stall torque to give. At the limit it still has its slew.
+    pub screw_droop: f64,
+    /// Part of full duty that the friction of the pre-tightener's screw takes: below it nothing
+    /// moves.
+    pub screw_friction: f64,
+    /// Amplitude of waves of the friction along the wall, part of its mean: machining, wear, dust.
+    pub friction_waviness: f64,
+    /// Length of the waves of the friction: of the order of the distance of two steps.
+    pub friction_wave_mm: f64,
 }
 
 /// A key of [`Mismatch`].
@@ -121,6 +131,10 @@ fields! {
     mode_shape: 1.0, (0.0, 2.0), (0.5, 1.0);
     tread_thickness_mm: 0.0, (0.0, 16.0), (4.0, 12.0);
     second_relaxation: 1.0, (1.0, 10.0), (1.0, 4.0);
+    screw_droop: 0.0, (0.0, 0.5), (0.0, 0.2);
+    screw_friction: 0.0, (0.0, 0.2), (0.0, 0.05);
+    friction_waviness: 0.0, (0.0, 0.5), (0.0, 0.1);
+    friction_wave_mm: 22.0, (2.0, 200.0), (11.0, 44.0);
 }
 
 impl Mismatch {
@@ -186,6 +200,8 @@ impl PlantParameters {
             bend_mm: mismatch.bend_mm,
             length_mm: self.stops_mm.0 + self.stops_mm.1,
         });
+        (self.screw_droop, self.screw_friction) = (mismatch.screw_droop, mismatch.screw_friction);
+        self.friction_waves = (mismatch.friction_waviness, mismatch.friction_wave_mm);
         self.run_out_mm = mismatch.run_out_mm;
         self.backlash_mm = mismatch.backlash_mm;
         self.pivot_friction_n = mismatch.pivot_friction_n;
@@ -227,6 +243,16 @@ mod tests {
             let (low, high) = field.wide;
             *(field.of)(&mut mismatch) = if high == field.neutral { low } else { high };
             assert_ne!(nominal.clone().with_mismatch(&mismatch), nominal, "{}", field.name);
+        }
+    }
+
+    #[test]
+    fn friction_waves_along_the_wall_about_its_mean() {
+        let mismatch =
+            Mismatch { friction_waviness: 0.1, friction_wave_mm: 20.0, ..Mismatch::default() };
+        let plant = Scenario::default().plant().with_mismatch(&mismatch);
+        for (position_mm, part) in [(0.0, 1.0), (5.0, 1.1), (10.0, 1.0), (35.0, 0.9)] {
+            assert!((plant.friction_at(position_mm) / plant.mu - part).abs() < 1e-12);
         }
     }
 

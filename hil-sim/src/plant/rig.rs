@@ -164,6 +164,11 @@ impl VirtualRig {
             dt_s,
             seat,
             range,
+        )
+        .with_losses(
+            parameters.screw_droop,
+            parameters.screw_friction,
+            parameters.preload_limit_n,
         );
         let modes = parameters.modes.iter().map(|&mode| Mode::new(mode)).collect();
         let mut rig = Self {
@@ -189,7 +194,6 @@ impl VirtualRig {
                 position_mm,
                 height_mm: local.base_mm + height_mm,
                 depth_mm: radius - height_mm,
-                friction: parameters.mu,
                 ..Truth::default()
             },
             energy: Energy::default(),
@@ -274,7 +278,7 @@ impl VirtualRig {
     pub fn step(&mut self, drives: &Drives, dt_s: f64) -> Result<(), PlantError> {
         let [drive, preload] = drives.worked();
         let worked = &Drives { drive, preload, ..*drives };
-        self.preload.step(preload, drives.preload_on, dt_s);
+        self.preload.step(preload, drives.preload_on, self.truth.preload_n, dt_s);
         let mut left_s = dt_s;
         while left_s > 0.0 {
             let distance = self.farthest(left_s);

@@ -2,7 +2,7 @@
 
 use hil_sim::plant::draw::PlantParameters;
 use hil_sim::plant::mismatch::Mismatch;
-use hil_sim::plant::rig::{Resolution, VirtualRig};
+use hil_sim::plant::rig::{Drives, Resolution, VirtualRig};
 use hil_sim::plant::wall::Wall;
 use hil_sim::scenario::Scenario;
 
@@ -162,6 +162,62 @@ fn what_moves_has_a_weight() {
         rig.traction_n()
     };
     close(traction(5.0) - traction(0.0), 5.0, 0.01);
+}
+
+#[test]
+fn a_sliding_wheel_has_the_friction_of_its_place() {
+    let waves = Mismatch { friction_waviness: 0.1, friction_wave_mm: 20.0, ..neutral() };
+    let mut plant = smooth(Mismatch { friction: 0.15, ..waves });
+    // Beyond friction: it slides back from 40 mm on.
+    plant.load_n = 8.0;
+    let here = plant.clone();
+    let mut rig = VirtualRig::new(plant, 40.0, 33.3, TICK_S);
+    let drives = drive(rig.parameters(), 8.0);
+    let (mut before, mut least, mut most) = (40.0, f64::MAX, 0.0f64);
+    while before > 10.0 {
+        steps(&mut rig, &drives, 1);
+        let truth = rig.truth();
+        assert_eq!(truth.friction, here.friction_at(truth.position_mm));
+        if truth.slip_mm > 0.1 {
+            let (from, to) = (here.friction_at(before), truth.friction);
+            let used = truth.utilisation;
+            assert!(used > 0.998 * from.min(to) && used < 1.001 * from.max(to), "{truth:?}");
+            (least, most) = (least.min(used), most.max(used));
+        }
+        before = truth.position_mm;
+    }
+    close(least, 0.9 * here.mu, 0.01);
+    close(most, 1.1 * here.mu, 0.01);
+}
+
+#[test]
+fn the_pre_tightener_is_faster_below_its_limit() {
+    let limit_n = nominal("prototype").preload_limit_n;
+    let slew = nominal("prototype").slew_n_per_s;
+    // Rate over two newtons about this preload, N/s, and what a small duty has done before, N.
+    let raises = |preload_n: f64, screw_droop, screw_friction| {
+        let plant = smooth(Mismatch { screw_droop, screw_friction, ..neutral() });
+        let mut rig = VirtualRig::new(plant, 0.0, preload_n - 10.0, TICK_S);
+        let small = Drives { preload: 0.04, preload_on: true, ..Drives::default() };
+        steps(&mut rig, &small, 300);
+        let crept = rig.truth().preload_n - (preload_n - 10.0);
+        let drives = Drives { preload: 1.0, ..small };
+        let mut ticks = 0;
+        while rig.truth().preload_n < preload_n + 1.0 {
+            ticks += u32::from(rig.truth().preload_n >= preload_n - 1.0);
+            steps(&mut rig, &drives, 1);
+        }
+        (2e3 / f64::from(ticks), crept)
+    };
+    for preload_n in [0.5 * limit_n, limit_n] {
+        let (rate, crept) = raises(preload_n, 0.2, 0.05);
+        let faster = 0.2 * (1.0 - preload_n / limit_n) / 0.75;
+        close(rate, slew * (1.0 + faster), 0.02);
+        assert!(crept.abs() < 1e-9, "{crept}");
+        let (rate, crept) = raises(preload_n, 0.0, 0.0);
+        close(rate, slew, 0.02);
+        assert!(crept > 0.1, "{crept}");
+    }
 }
 
 #[test]

@@ -30,10 +30,9 @@ impl VirtualRig {
         self.truth.utilisation * self.forces.0
     }
 
-    /// Friction of tread on wall becomes this.
+    /// Mean friction of tread on wall becomes this.
     pub fn set_friction(&mut self, mu: f64) {
         self.parameters.mu = mu;
-        self.truth.friction = mu;
     }
 
     /// Axial load on the wheel becomes this, N.

@@ -79,8 +79,9 @@ impl VirtualRig {
     /// Largest acceleration of a sliding carriage, mm/s^2.
     pub(super) fn sliding_gain(&self) -> f64 {
         let (_, cosine, sine) = self.forces;
-        let most = self.parameters.mu * cosine + sine.abs() + self.parameters.load_n.abs();
-        1000.0 * most / self.parameters.mass_kg
+        let p = &self.parameters;
+        let friction = p.friction_at(self.truth.position_mm);
+        1000.0 * (friction * cosine + sine.abs() + p.load_n.abs()) / p.mass_kg
     }
 
     /// What the motor makes of the next `dt_s`, and where the forces of the last stride
@@ -101,7 +102,7 @@ impl VirtualRig {
         }
         let (normal, cosine, sine) = self.forces;
         let grip = Grip {
-            mu: p.mu,
+            mu: p.friction_at(self.truth.position_mm),
             creep: p.elastic_creep,
             rolling: self.imposed_speed_mm_s.unwrap_or(tread).abs(),
             load_n: p.load_n,
@@ -146,7 +147,7 @@ impl VirtualRig {
         let position = self.truth.position_mm + stride.travel_mm;
         if position < low || position > high {
             stride.travel_mm = position.clamp(low, high) - self.truth.position_mm;
-            let friction = p.mu.copysign(grip.tread);
+            let friction = grip.mu.copysign(grip.tread);
             let slower = grip.tread - grip.yields * friction * normal;
             // The wheel spins, and presses itself in by what it pushes with; or it stands.
             let spins = slower * grip.tread > 0.0 && self.freedom(friction) >= JAMMED_BELOW;

@@ -67,6 +67,7 @@ impl VirtualRig {
         let compression_mm = self.compression_mm();
         let truth = &mut self.truth;
         truth.compression_mm = compression_mm;
+        truth.friction = self.parameters.friction_at(truth.position_mm);
         truth.radius_mm = self.parameters.wall_radius_mm - (truth.height_mm - above);
         truth.arm_rad = self.parameters.arm.angle(truth.radius_mm);
         let radius = self.parameters.ring.radius_mm;

@@ -18,7 +18,8 @@ impl VirtualRig {
         let (leans, load) = (sine / cosine, self.parameters.load_n);
         let pressed = self.preload_now() + self.thrust_ratio() * self.thrust_n;
         let carried = ((pressed - load * leans) / (1.0 + leans * leans)).max(0.0);
-        (load + leans * carried).min(self.parameters.mu * carried)
+        let friction = self.parameters.friction_at(self.truth.position_mm);
+        (load + leans * carried).min(friction * carried)
     }
 
     /// Modes of the arm, forced by the torque ripple of motor and gearbox and by the load that
