@@ -58,7 +58,7 @@ impl Rig {
         // What the proportional part adds, whatever the load.
         let corrected =
             drive.stall_force_n * PROPORTIONAL * MOST_ERROR_MM_S / drive.no_load_speed_mm_s;
-        let checks: [(_, _, &[&'static str], _); 10] = [
+        let checks: [(_, _, &[&'static str], _); 9] = [
             (
                 self.sense.encoder_counts,
                 Bound::AtLeast(turn_mm / LARGEST_COUNT_MM),
@@ -76,12 +76,6 @@ impl Rig {
                 Bound::AtLeast(deepest / SHOWN_PART),
                 &["sense.tread_full_scale_mm", "preload.limit_n", "tread.k_inf_pa_per_m"],
                 "the sensor does not show how deep preload.limit_n presses a corner into the tread",
-            ),
-            (
-                preload.cruise_n,
-                Bound::AtMost(self.most_preload_n()),
-                &["preload.cruise_n", "preload.limit_n", "sense.preload_error"],
-                "less is free below preload.limit_n for regulation and the sensor's error",
             ),
             (
                 preload.slew_n_per_s,

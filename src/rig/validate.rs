@@ -184,9 +184,14 @@ impl Rig {
         let safe = ("control.safe_speed_mm_s", self.control.safe_speed_mm_s);
         let least = ("drive.min_crossing_speed_mm_s", self.drive.min_crossing_speed_mm_s);
         let top = ("drive.no_load_speed_mm_s", self.drive.no_load_speed_mm_s);
-        for (upper, lower, ratio) in
-            [(safe, least, 1.0), (cruise, safe, 1.0), (top, cruise, TOP_SPEED_RESERVE)]
-        {
+        let limit = ("preload.limit_n", self.preload.limit_n);
+        let pressed = ("preload.cruise_n", self.preload.cruise_n);
+        for (upper, lower, ratio) in [
+            (safe, least, 1.0),
+            (cruise, safe, 1.0),
+            (top, cruise, TOP_SPEED_RESERVE),
+            (limit, pressed, self.preload.limit_n / self.most_preload_n()),
+        ] {
             if upper.1 < lower.1 * ratio {
                 return Err(RigError::Pair { upper, lower, ratio });
             }

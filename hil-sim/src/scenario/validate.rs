@@ -54,6 +54,7 @@ fn of_rig(error: &RigError, scenario: &Scenario, from: &Provenance) -> ScenarioE
     match others.iter().find(|key| from.is_written(key)) {
         Some(key) => {
             let value = value(key).unwrap_or_default();
+            let text = text.replacen(": expected ", ", of which it expects ", 1);
             ScenarioError::at(from.of(key), format!("{key} = {value} does not fit {text}"))
         }
         None => ScenarioError::at(from.of(first), text),
