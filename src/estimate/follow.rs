@@ -284,8 +284,8 @@ impl Estimator {
             state.odometry.set_by_step(sensed.travel, state.position - residual);
             state.known = Position::Located;
             (residual, open.corrected) = (Q16::ZERO, true);
-        } else if corrects && !retracts && self.is_explained(state, residual) {
-            residual = self.correct(state, sensed, residual, found);
+        } else if corrects && !retracts && self.is_explained(state, open.step, residual) {
+            residual = self.correct(state, sensed, (open.step, residual), found);
             open.corrected = true;
         }
         // Another one is judged when the step's height is known.
@@ -317,8 +317,10 @@ impl Estimator {
     }
 
     /// Whether a step is off by no more than is tolerated, or by as much as the one before it.
-    fn is_explained(&self, state: &EstimateState, residual: Millimetres) -> bool {
-        let before = state.displaced.unwrap_or(Q16::ZERO);
+    fn is_explained(&self, state: &EstimateState, step: u8, residual: Millimetres) -> bool {
+        // A step that is met again does not speak for another one.
+        let other = state.displaced.filter(|(other, _)| *other != step);
+        let before = other.map_or(Q16::ZERO, |(_, off)| off);
         let tolerance = self.tolerated(state);
         residual.abs() <= tolerance || (residual - before).abs() <= tolerance
     }
@@ -328,25 +330,25 @@ impl Estimator {
         &self,
         state: &mut EstimateState,
         sensed: &SensedState,
-        residual: Millimetres,
+        (step, residual): (u8, Millimetres),
         found: &mut Findings,
     ) -> Millimetres {
         if residual.abs() <= self.tolerated(state) {
             state.displaced = None;
             state.odometry.correct(state.position, residual)
-        } else if self.is_explained(state, residual) {
+        } else if self.is_explained(state, step, residual) {
             // Two in a row off by the same: the odometry is wrong.
             state.odometry.set_by_step(sensed.travel, state.position - residual);
             state.displaced = None;
             Q16::ZERO
-        } else if state.displaced.is_some() {
+        } else if state.displaced.is_some_and(|(other, _)| other != step) {
             // Two in a row off by different distances: the odometry has lost its scale, or the
             // table is wrong throughout.
             found.fault.get_or_insert(Fault::StepsDisagree);
             residual
         } else {
             // One alone: the step is displaced.
-            state.displaced = Some(residual);
+            state.displaced = Some((step, residual));
             report_displaced(state, residual, found);
             residual
         }
@@ -398,7 +400,7 @@ impl Estimator {
                     Some(_) if open.corrected => state.odometry.refine(shift),
                     Some(_) => {
                         let residual = point.residual + shift;
-                        self.correct(state, sensed, residual, found) - point.residual
+                        self.correct(state, sensed, (open.step, residual), found) - point.residual
                     }
                 };
                 point.face += left;
@@ -615,7 +617,7 @@ mod tests {
         let place = estimator.steps.face(2).expect("a second step");
         let off = q16(3_000_000);
         let mut state = EstimateState { known: Position::Located, ..EstimateState::default() };
-        state.displaced = Some(off);
+        state.displaced = Some((1, off));
         state.set_position(sensed.travel, place + off);
         let lift = Some(LiftPoint { face: place + off, residual: off, ..LiftPoint::default() });
         state.crossing = Some(OpenCrossing { step: 2, lift, ..OpenCrossing::default() });

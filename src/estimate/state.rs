@@ -42,7 +42,7 @@ pub struct EstimateState {
     /// The step ahead is late and has been reported.
     pub(super) late: bool,
     /// Residual of the last step found, if it was beyond the tolerance, mm.
-    pub(super) displaced: Option<Millimetres>,
+    pub(super) displaced: Option<(u8, Millimetres)>,
     /// Face of the step being left although its crossing is not followed, mm.
     pub(super) leaving: Option<Millimetres>,
     /// Steps of the table given up since the stow end.

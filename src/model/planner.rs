@@ -490,8 +490,13 @@ impl Planner {
         self.thrust(&request.learned, tangent)
     }
 
-    /// Least preload for the step ahead, N: that of cruise, or less while it is being built up.
+    /// Least preload for the step ahead, N: that of cruise, or less while it is being built up. Under
+    /// more load than was told, all that there is until a crossing has gripped.
     fn least_preload(&self, request: &PlanRequest) -> Newtons {
+        let Learned { extra_load, grips, .. } = request.learned;
+        if extra_load > Q16::ZERO && grips == Q16::ZERO {
+            return self.most_preload;
+        }
         let least = self.cruise_preload * BUILDING;
         request.preload.clamp(least, self.cruise_preload)
     }

@@ -6,11 +6,13 @@ use crate::estimate::OpenCrossing;
 use crate::fault::{Fault, Limit};
 use crate::model::{Outcome, Plan, PlanRequest};
 use crate::supervise::Mode;
-use crate::units::{Direction, Newtons, Seconds, Tick, ticks_to_seconds};
+use crate::units::{Direction, Millimetres, Newtons, Seconds, Tick, q16, ticks_to_seconds};
 
 /// Ticks for which the drive may wait for the preload unreported: a spring that moves with the
 /// wheel takes that long to be followed.
 const WAIT_TICKS: u32 = 100;
+/// Slip on a corner that ends a run for want of friction, mm: twice what a measured one is off by.
+const SURE_SLIP: Millimetres = q16(1_000_000);
 /// Ticks within which the model task must answer.
 const ANSWER_TICKS: u32 = 500;
 
@@ -76,7 +78,8 @@ impl Controller {
         planning.plan = Some(*plan);
         planning.slipped = None;
         planning.learned.slips = plan.slips;
-        if plan.short && matches!(state.mode, Mode::Run(Direction::Deploy, _)) {
+        let sure = planning.lost > SURE_SLIP;
+        if plan.short && sure && matches!(state.mode, Mode::Run(Direction::Deploy, _)) {
             tick.fail(Fault::FrictionShort);
         }
     }
@@ -157,7 +160,7 @@ mod tests {
     use crate::model::{Learned, Planner, Review};
     use crate::rig::Rig;
     use crate::supervise::Leg;
-    use crate::units::{Direction, Q16, q16};
+    use crate::units::Q16;
 
     /// In motion on the first wall.
     fn running() -> State {

@@ -60,7 +60,7 @@ fn fails(case: &Scenario, seed: u64) -> Option<String> {
 /// Refused in one line, with the key and what is expected.
 fn well_refused(error: &ScenarioError, key: &str) -> Option<String> {
     let text = error.to_string();
-    let well = text.contains(key) && text.contains("expected") && !text.contains('\n');
+    let well = text.contains(key) && text.contains("expect") && !text.contains('\n');
     (!well).then_some(text)
 }
 
