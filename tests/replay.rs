@@ -212,7 +212,7 @@ fn every_recorded_run_is_replayed_to_the_bit() {
         ("presses", 0, Some(Retract)),
         // A wheel that slips on a corner; a late and weak preload; twice the load; late ticks.
         ("slip", 1, None),
-        ("soft", 2, None),
+        ("soft", 3, Some(Deploy)),
         ("load", 3, Some(Retract)),
         ("late", 0, None),
         // Preload sensor stuck, compression sensor too high, encoder losing counts, arm angle
@@ -232,7 +232,7 @@ fn every_recorded_run_is_replayed_to_the_bit() {
 
 #[test]
 fn resets_near_corners() {
-    for (name, crossings) in [("resets-1.mcap", 8), ("resets-2.mcap", 8), ("resets-3.mcap", 11)] {
+    for (name, crossings) in [("resets-1.mcap", 8), ("resets-2.mcap", 9), ("resets-3.mcap", 11)] {
         replayed(name, crossings);
         assert_eq!(Recorded::read(name).0.len(), 10, "{name}");
     }
