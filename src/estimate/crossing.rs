@@ -11,7 +11,7 @@
 #[allow(clippy::float_arithmetic, reason = "SI to machine units, once at start")]
 mod build;
 
-use crate::numeric::{LowPass, LowPassState, sqrt};
+use crate::numeric::{LowPass, LowPassState, between, sqrt};
 use crate::units::Direction;
 use crate::units::{Millimetres, Q16, Ratio, q16};
 
@@ -285,7 +285,7 @@ impl CrossingWatch {
     /// Distance from a face at which an undeformed wheel on this ground touches its edge, mm, over the
     /// wall above: `sqrt(R^2 - (R - f)^2)`.
     pub fn reach(&self, state: &WatchState, ground: Millimetres) -> Millimetres {
-        let fallen = (ground - state.baseline.output()).clamp(Q16::ZERO, self.step + HEIGHT_MOST);
+        let fallen = between(ground - state.baseline.output(), Q16::ZERO, self.step + HEIGHT_MOST);
         sqrt(fallen * (self.radius + self.radius - fallen))
     }
 

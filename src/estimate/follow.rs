@@ -427,8 +427,8 @@ impl Estimator {
     /// A step found by a search on the way down is the one above the wall that the arm shows behind
     /// it: between walls, steps off their heights might have been taken for another level.
     fn count_down(&self, state: &mut EstimateState, sensed: &SensedState, open: &mut OpenCrossing) {
-        let level =
-            sensed.steps_up.round().clamp(0, i32::from(self.steps.count().saturating_sub(1))) as u8;
+        let most = i32::from(self.steps.count()) - 1;
+        let level = sensed.steps_up.round().min(most).max(0) as u8;
         state.level = level;
         state.next_step = level;
         open.step = level + 1;

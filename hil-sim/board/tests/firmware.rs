@@ -105,7 +105,8 @@ fn assert_alike(board: &Recording, scenario: &Scenario) {
     let software = software(scenario, first, command);
     let in_software = rows(&software);
     let still = (command + STILL - first) as usize;
-    for (one, other) in on_board.iter().zip(&in_software).take(still) {
+    // The first tick may find a converter's code of the millisecond before.
+    for (one, other) in on_board.iter().zip(&in_software).take(still).skip(1) {
         assert_eq!(codes(one), codes(other), "tick {}", one.tick);
     }
     let (board, software) = (&board.summary, &software.summary);
