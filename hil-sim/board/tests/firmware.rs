@@ -96,8 +96,12 @@ const QUANTITIES: [Quantity; 4] = [
     ("corner force, N", |c| c.corner_force_n, 0.55, 0.0),
 ];
 
-/// Until something moves, board and software read the same codes to the bit; then the runs stay
-/// together.
+/// Codes by which a sensor at rest differs from itself a millisecond before or after: six deviations
+/// of the noise of two readings.
+const NOISE_CODES: u16 = 250;
+
+/// Until something moves, board and software read the same but for the noise: the board's tick
+/// stands anywhere in the plant's millisecond. Then the runs stay together.
 fn assert_alike(board: &Recording, scenario: &Scenario) {
     let on_board = rows(board);
     let first = on_board.first().expect("a tick").tick;
@@ -105,9 +109,11 @@ fn assert_alike(board: &Recording, scenario: &Scenario) {
     let software = software(scenario, first, command);
     let in_software = rows(&software);
     let still = (command + STILL - first) as usize;
-    // The first tick may find a converter's code of the millisecond before.
-    for (one, other) in on_board.iter().zip(&in_software).take(still).skip(1) {
-        assert_eq!(codes(one), codes(other), "tick {}", one.tick);
+    for (one, other) in on_board.iter().zip(&in_software).take(still) {
+        for (ours, theirs) in codes(one).into_iter().zip(codes(other)) {
+            let off = ours.expect("a code").abs_diff(theirs.expect("a code"));
+            assert!(off <= NOISE_CODES, "tick {}: {ours:?}, {theirs:?}", one.tick);
+        }
     }
     let (board, software) = (&board.summary, &software.summary);
     assert!(board.completed && software.completed, "{:?}, {:?}", board.faults, software.faults);
