@@ -50,6 +50,18 @@ fn what_was_wrong_in_silence_is_reported() {
     }
 }
 
+/// On a sensor of the mean compression a corner that begins to carry looks half like a slip.
+#[test]
+fn a_wheel_that_grips_is_not_said_to_slip() {
+    for seed in ["30084", "30160"] {
+        let set = format!("run.seed={seed}");
+        let summary = ran(&[&set, "run.mismatch=wide"], Direction::Deploy);
+        assert!(summary.completed && summary.slip_mm == 0.0, "{seed} {:?}", summary.faults);
+        let slips = summary.limits.iter().any(|l| l.code == Limit::WheelSlipped.code());
+        assert!(!slips, "{seed}");
+    }
+}
+
 #[test]
 fn an_unknown_friction_is_no_secret() {
     let (parts, seeds): (Vec<u32>, Vec<u64>) = if long() {
