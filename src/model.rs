@@ -10,7 +10,9 @@ pub mod impact;
 mod plan;
 pub mod planner;
 pub mod reduced;
+pub mod rollout;
 pub mod timing;
+pub mod tread;
 
 pub use plan::{Approach, Learned, LimitedBy, Outcome, Plan, PlanRequest, Review, Strategy};
 pub use planner::Planner;
