@@ -8,10 +8,9 @@ use super::tread::{Shown, TreadState};
 use super::{CornerSlip, Place, Position, PositionConfidence};
 use crate::fault::{Fault, Limit};
 use crate::model::LimitedBy;
+use crate::model::history::{History, HistoryWriter};
 use crate::numeric::LowPassState;
-use crate::units::{
-    Direction, Millimetres, MillimetresPerSecond, Newtons, Q16, Ratio, Tick, Travel, q16,
-};
+use crate::units::{Direction, Millimetres, MillimetresPerSecond, Newtons, Q16, Tick, Travel, q16};
 
 /// Error of the place at which a lift-off is detected, mm: the steps of the angle code, and the
 /// tolerance of the step's height on a wheel that creeps.
@@ -27,6 +26,7 @@ pub struct EstimateState {
     /// Crossing watch.
     pub watch: WatchState,
     pub(super) tread: TreadState,
+    pub(super) history: HistoryWriter,
     /// Preload behind the memory of the tread, N.
     pub(super) remembered: LowPassState,
     /// Speed behind it.
@@ -111,16 +111,16 @@ pub struct LiftPoint {
     pub position: Millimetres,
     /// Gap with the nominal step height, mm: of a wheel as deep in the corner.
     pub gap: Millimetres,
+    /// How the wheel came here, and its distance to the face, mm.
+    pub history: History,
+    /// See `history`.
+    pub distance: Millimetres,
     /// Wheel speed as the tread remembers it, mm/s.
     pub speed: MillimetresPerSecond,
     /// Wheel speed in that tick, mm/s.
     pub held: MillimetresPerSecond,
     /// Preload, N.
     pub preload: Newtons,
-    /// Preload behind the memory of the tread, N.
-    pub remembered: Newtons,
-    /// Tangent of the arm angle.
-    pub tan_arm: Ratio,
     /// Position of the face as found, mm.
     pub face: Millimetres,
     /// Found minus table, mm.

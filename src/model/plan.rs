@@ -1,5 +1,6 @@
 //! Requests of the tick to the model task, and its answers.
 
+use super::history::History;
 use crate::fault::Limit;
 use crate::units::{Direction, Millimetres, MillimetresPerSecond, Newtons, Ratio, Seconds};
 
@@ -60,12 +61,12 @@ impl LimitedBy {
 pub struct Review {
     /// Direction of the crossing.
     pub direction: Direction,
-    /// Speed at lift-off, mm/s.
+    /// How the wheel came to lift-off, and its distance to the face then, mm.
+    pub history: History,
+    /// See `history`.
+    pub distance: Millimetres,
+    /// Wheel speed then, mm/s.
     pub speed: MillimetresPerSecond,
-    /// Measured preload at lift-off, N.
-    pub preload: Newtons,
-    /// Tangent of the arm angle at lift-off.
-    pub tan_arm: Ratio,
     /// Measured gap of a step of nominal height, mm: how high this one is shows the sleeve, not
     /// the tread.
     pub gap: Millimetres,

@@ -9,21 +9,64 @@ use crate::units::{Direction, Millimetres, MillimetresPerSecond, Newtons, Q16, R
 /// What a crossing gives.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Rolled {
-    /// Clearance between step root and undeformed wheel when the lower wall stops (retract:
-    /// begins) to carry, mm; zero if it never does.
-    pub gap: Millimetres,
-    /// Axial position and height of the centre there, mm.
-    pub lift: (Millimetres, Millimetres),
-    /// Friction needed there, and the most on the way.
-    pub lift_utilisation: Ratio,
-    /// See `lift_utilisation`.
-    pub utilisation: Ratio,
+    /// Lift-off (retract: touch-down).
+    pub lift: LiftOff,
     /// Largest axial force of the contact against the motion outwards, N.
     pub corner_force: Newtons,
     /// Elements visited and strides made.
     pub visits: u32,
     /// See `visits`.
     pub strides: u32,
+}
+
+/// The instant at which the lower wall stops (retract: begins) to carry, as the strides come to it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct LiftOff {
+    /// Clearance between step root and undeformed wheel there, mm; zero as long as it is not found.
+    pub gap: Millimetres,
+    /// Axial position and height of the centre there, mm.
+    pub position: Millimetres,
+    /// See `position`.
+    pub centre: Millimetres,
+    /// Friction needed there.
+    pub used_there: Ratio,
+    /// The most friction needed so far.
+    pub utilisation: Ratio,
+    /// The last stride's contact before the face, and the strides made.
+    last: Option<Contact>,
+    strides: u32,
+}
+
+impl LiftOff {
+    /// Whether it has come.
+    pub fn is_found(&self) -> bool {
+        self.gap > Q16::ZERO
+    }
+
+    /// One stride further.
+    pub fn follow(&mut self, tread: &Tread, direction: Direction, now: &Contact) {
+        self.strides += 1;
+        if self.strides > SETTLES {
+            self.utilisation = self.utilisation.max(now.utilisation);
+        }
+        let before = self.last.filter(|_| now.position < Q16::ZERO && !self.is_found());
+        self.last = (now.position < Q16::ZERO).then_some(*now);
+        let Some(before) = before else { return };
+        let [carried, carries] = [&before, now].map(|contact| contact.floor > Q16::ZERO);
+        let found = match direction {
+            Direction::Deploy => carried && !carries,
+            Direction::Retract => !carried && carries,
+        };
+        if found {
+            let part = divide(before.floor, before.floor - now.floor);
+            let mix = |a: Q16, b: Q16| a + part * (b - a);
+            self.position = mix(before.position, now.position);
+            self.centre = mix(before.centre, now.centre);
+            self.used_there = mix(before.utilisation, now.utilisation);
+            let (x, y) = (self.position, self.centre);
+            self.gap = sqrt(x * x + y * y) - tread.radius();
+        }
+    }
 }
 
 /// How a wheel goes over a step.
@@ -65,11 +108,10 @@ pub fn roll(
     };
     tread.put_down(state, run.from, &drive);
     let mut rolled = Rolled::default();
-    let mut last: Option<Contact> = None;
     let mut position = run.from;
     // The wheel needs a stride to each stride of travel, and on the edge up to twice that.
     let most = between(divide((run.until - run.from).abs(), tread.stride()).floor(), 0, 2000);
-    for stride in 0..2 * most {
+    for _ in 0..2 * most {
         let (speed, pressed) = course(position);
         drive.pressed = pressed;
         drive.duration = divide(tread.stride(), speed.max(LEAST_SPEED));
@@ -77,22 +119,10 @@ pub fn roll(
         position = contact.position;
         rolled.visits += contact.visits;
         rolled.strides += 1;
-        if stride > SETTLES {
-            rolled.utilisation = rolled.utilisation.max(contact.utilisation);
+        rolled.lift.follow(tread, run.direction, &contact);
+        if rolled.strides > SETTLES {
             rolled.corner_force = rolled.corner_force.max(contact.axial);
         }
-        let before = last.filter(|_| position < Q16::ZERO && rolled.gap == Q16::ZERO);
-        if let Some(before) = before {
-            let lifted = if forward {
-                before.floor > Q16::ZERO && contact.floor <= Q16::ZERO
-            } else {
-                before.floor <= Q16::ZERO && contact.floor > Q16::ZERO
-            };
-            if lifted {
-                note(tread, &mut rolled, &before, &contact);
-            }
-        }
-        last = (position < Q16::ZERO).then_some(contact);
         if (position > run.until) == forward {
             break;
         }
@@ -101,14 +131,4 @@ pub fn roll(
 }
 
 /// Strides after which a wheel that was put down rolls.
-const SETTLES: i32 = 8;
-
-/// The instant at which the lower wall carries nothing, between two strides.
-fn note(tread: &Tread, rolled: &mut Rolled, before: &Contact, now: &Contact) {
-    let part = divide(before.floor, before.floor - now.floor);
-    let mix = |a: Q16, b: Q16| a + part * (b - a);
-    let (x, y) = (mix(before.position, now.position), mix(before.centre, now.centre));
-    rolled.lift = (x, y);
-    rolled.lift_utilisation = mix(before.utilisation, now.utilisation);
-    rolled.gap = sqrt(x * x + y * y) - tread.radius();
-}
+const SETTLES: u32 = 8;

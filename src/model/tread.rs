@@ -127,6 +127,11 @@ impl Tread {
         self.stride
     }
 
+    /// Height of the step, mm.
+    pub const fn height(&self) -> Millimetres {
+        Q16::from_bits(self.height >> 6)
+    }
+
     /// Wheel radius, mm.
     pub const fn radius(&self) -> Millimetres {
         Q16::from_bits(self.radius >> 6)

@@ -33,9 +33,9 @@ impl Controller {
             state.planning.closed = Some(open);
             state.planning.review = open.lift.map(|point| Review {
                 direction: open.direction,
-                speed: point.speed,
-                preload: point.remembered,
-                tan_arm: point.tan_arm,
+                history: point.history,
+                distance: point.distance,
+                speed: point.held,
                 gap: point.gap,
                 seen: open.gap,
                 trusted: open.expected && plausible,

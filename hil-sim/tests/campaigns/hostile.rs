@@ -6,6 +6,7 @@
 
 use super::parity;
 use hil_sim::session::Echo;
+use interstage::model::history::History;
 use interstage::model::reduced::{Point, ReducedModel, Scale};
 use interstage::model::{Learned, Plan, PlanRequest, Planner, Review};
 use interstage::rig::Rig;
@@ -235,9 +236,9 @@ fn asked(planner: &Planner, model: &ReducedModel) -> Option<String> {
                 let _ = model.observed_scale(&point, a, b);
                 let review = Review {
                     direction,
+                    history: History::steady(1, a),
+                    distance: b,
                     speed,
-                    preload: a,
-                    tan_arm: b,
                     gap: ratio,
                     seen: ratio,
                     trusted: true,

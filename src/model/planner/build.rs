@@ -7,6 +7,7 @@ use crate::model::guard::Guard;
 use crate::model::plan::Strategy;
 use crate::model::reduced::{ReducedModel, Scale};
 use crate::model::timing::Timing;
+use crate::model::tread::Tread;
 use crate::numeric::checked;
 use crate::rig::{MAX_STEPS, Rig, RigError};
 use crate::units::{Direction, Millimetres, Ratio};
@@ -62,6 +63,7 @@ impl Planner {
             model,
             guard: Guard::try_build(rig)?,
             timing: Timing::try_build(rig)?,
+            tread: Tread::try_build(rig)?,
             dip: Dip::try_build(rig)?,
             strategy,
             tangents,
@@ -116,6 +118,7 @@ fn felt_at(rig: &Rig) -> Result<[Millimetres; 2], RigError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::history::History;
     use crate::model::plan::{Learned, PlanRequest, Review, Strategy};
     use crate::units::Q16;
     use proptest::prelude::*;
@@ -198,9 +201,9 @@ mod tests {
             let q = Q16::from_num::<f64>;
             let review = Review {
                 direction: Direction::Deploy,
+                history: History::steady((200.0 / speed.max(0.01)) as u16, q(preload + 7.0)),
+                distance: q(12.0),
                 speed: q(speed),
-                preload: q(preload),
-                tan_arm: q(1.0),
                 gap: q(gap),
                 seen: q(gap),
                 trusted: true,

@@ -1,6 +1,8 @@
 //! Plans and reviews on the preset rigs.
 
 use super::*;
+use crate::model::history::History;
+use crate::model::plan::{Outcome, Review};
 use crate::rig::Rig;
 use crate::units::q16;
 
@@ -10,9 +12,9 @@ fn reviewed_after(wider: f64, trusted: bool, known: &Learned) -> Outcome {
     let planner = Planner::try_build(&Rig::prototype()).expect("a sound rig");
     let mut review = Review {
         direction: Direction::Deploy,
+        history: History::steady(25, q16(54_000_000)),
+        distance: q16(12_100_000),
         speed: q16(8_000_000),
-        preload: q16(47_000_000),
-        tan_arm: q16(1_000_000),
         gap: Millimetres::from_num(2.5),
         seen: Millimetres::from_num(2.5),
         trusted: false,
@@ -31,11 +33,9 @@ fn reviewed(wider: f64, trusted: bool) -> Outcome {
 
 /// Scale that a crossing whose gap is this much wider shows, mm.
 fn observed(wider: f64) -> f64 {
-    let planner = Planner::try_build(&Rig::prototype()).expect("a sound rig");
-    let at = Point::nominal(Direction::Deploy, q16(8_000_000));
-    let force = q16(47_000_000) + planner.thrust(&Learned::default(), q16(1_000_000));
-    let gap = planner.model.crossing(&at, force).gap + Millimetres::from_num(wider);
-    planner.model.observed_scale(&at, gap, force).to_num()
+    // All of it is taken by one who knows nothing.
+    let known = Learned { deviation: q16(9_000_000), ..Learned::default() };
+    reviewed_after(wider, true, &known).learned.scale.to_num()
 }
 
 #[test]

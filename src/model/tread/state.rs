@@ -1,5 +1,7 @@
 //! Where the wheel is, and what its tread remembers.
 
+use crate::units::{Millimetres, Q16};
+
 /// Elements of the state: a power of two, more than there are rays.
 const ELEMENTS: usize = 256;
 
@@ -49,6 +51,11 @@ impl Default for TreadState {
 }
 
 impl TreadState {
+    /// Axial position of the centre from the face, outwards, mm.
+    pub const fn position(&self) -> Millimetres {
+        Q16::from_bits(self.frame.position >> 6)
+    }
+
     /// A wheel off the wall.
     pub(super) fn clear(&mut self) {
         *self = Self::default();

@@ -20,10 +20,43 @@ fn prints() {
         };
         let run = Run { direction, axial, scale: Q16::ONE, level: true, from, until };
         let got = roll(&tread, &mut state, &run, |_| (Q16::from_num(v), Q16::from_num(p)));
-        let gap: f64 = got.gap.to_num();
+        let gap: f64 = got.lift.gap.to_num();
         println!(
             "{direction:?} {axial:?} {v} {p}: {gap:.4} {:+.2} % {got:?}",
             100.0 * (gap / exact - 1.0)
         );
+    }
+}
+#[test]
+fn prints_pivot() {
+    let rig = Rig::prototype();
+    let tread = Tread::try_build(&rig).unwrap();
+    let mut state = TreadState::default();
+    for level in [true, false] {
+        for from in [25.0, 5.0, 1.2] {
+            for v in [21.1, 24.1] {
+                let run = Run {
+                    direction: Direction::Retract,
+                    axial: Axial::Driven(q16(6_666_666)),
+                    scale: Q16::ONE,
+                    level,
+                    from: Q16::from_num(from),
+                    until: q16(-14_000_000),
+                };
+                let mut n = 0;
+                let mut xs = std::vec::Vec::new();
+                let got = roll(&tread, &mut state, &run, |x| {
+                    n += 1;
+                    if n % 8 == 0 {
+                        xs.push(x.to_num::<f32>());
+                    }
+                    (Q16::from_num(v), q16(52_700_000))
+                });
+                println!(
+                    "{level} {from} {v}: gap {} x {} y {} strides {n} {xs:?}",
+                    got.lift.gap, got.lift.position, got.lift.centre
+                );
+            }
+        }
     }
 }
