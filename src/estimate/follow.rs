@@ -300,6 +300,8 @@ impl Estimator {
             speed: state.crossing_speed.speed(FILTER_LAG, sensed.speed.value),
             held: sensed.speed.value,
             preload: sensed.preload_filtered,
+            remembered: state.remembered_preload(),
+            tan_arm: sensed.tan_arm,
             // As the odometry has it once this step has corrected it.
             face: face - (before - residual),
             residual,

@@ -10,7 +10,9 @@ use crate::fault::{Fault, Limit};
 use crate::model::LimitedBy;
 use crate::model::history::{History, HistoryWriter};
 use crate::numeric::LowPassState;
-use crate::units::{Direction, Millimetres, MillimetresPerSecond, Newtons, Q16, Tick, Travel, q16};
+use crate::units::{
+    Direction, Millimetres, MillimetresPerSecond, Newtons, Q16, Ratio, Tick, Travel, q16,
+};
 
 /// Error of the place at which a lift-off is detected, mm: the steps of the angle code, and the
 /// tolerance of the step's height on a wheel that creeps.
@@ -121,6 +123,10 @@ pub struct LiftPoint {
     pub held: MillimetresPerSecond,
     /// Preload, N.
     pub preload: Newtons,
+    /// Preload behind the memory of the tread, N.
+    pub remembered: Newtons,
+    /// Tangent of the arm angle.
+    pub tan_arm: Ratio,
     /// Position of the face as found, mm.
     pub face: Millimetres,
     /// Found minus table, mm.

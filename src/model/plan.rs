@@ -66,7 +66,13 @@ pub struct Review {
     /// See `history`.
     pub distance: Millimetres,
     /// Wheel speed then, mm/s.
+    pub held: MillimetresPerSecond,
+    /// Speed and preload at lift-off as the tread remembers them, mm/s and N.
     pub speed: MillimetresPerSecond,
+    /// See `speed`.
+    pub preload: Newtons,
+    /// Tangent of the arm angle at lift-off.
+    pub tan_arm: Ratio,
     /// Measured gap of a step of nominal height, mm: how high this one is shows the sleeve, not
     /// the tread.
     pub gap: Millimetres,
