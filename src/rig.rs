@@ -9,7 +9,8 @@ mod abilities;
 mod presets;
 mod validate;
 
-pub(crate) use abilities::{CLIMB_PART, OVERPRESSURE_PART, SHORT_PART, START_LAG_MM};
+pub use abilities::OVERPRESSURE_PART;
+pub(crate) use abilities::{CLIMB_PART, SHORT_PART, START_LAG_MM};
 pub use validate::{Bound, RigError};
 
 /// Most steps a step table may hold.

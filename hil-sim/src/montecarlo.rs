@@ -44,6 +44,8 @@ pub struct RunLine {
     pub silent: bool,
     /// Whether it ended without a fault although something was wrong that nothing reports.
     pub unreported: bool,
+    /// Whether a fault ended it although the wheel had neither slipped nor opened a wide gap.
+    pub stopped_sound: bool,
     /// Crossings with gross slip, or 1 if the run slipped but none of them did.
     pub slip_events: usize,
     /// Least time by which the preload was reached before a corner touched, s.
@@ -87,6 +89,9 @@ impl RunLine {
             end_off_mm: called_complete.then(|| (summary.travel_mm - travel_mm).abs()),
             found_off_mm: crossings.iter().filter_map(found).collect(),
             silent: !completed && !reported,
+            stopped_sound: !summary.faults.is_empty()
+                && summary.slip_mm <= UNNAMED.0
+                && !opened_wide(&summary),
             unreported: summary.faults.is_empty() && is_unreported(&summary, &limits, travel_mm),
             duration_s: summary.duration_s,
             moving_s: summary.moving_s,
@@ -122,11 +127,15 @@ fn is_unreported(summary: &Summary, limits: &[u16], travel_mm: f64) -> bool {
     let off = |slip: f64, named: f64| (slip - named).abs() > UNNAMED.0.max(UNNAMED.1 * slip);
     let crossings = &summary.crossings;
     let crossed: f64 = crossings.iter().map(|c| c.slip_mm).sum();
-    let wide = summary.max_gap_mm > GAP * summary.gap_ref_mm && summary.gap_ref_mm > 0.0;
+    let wide = opened_wide(summary);
     crossings.iter().any(|c| off(c.slip_mm, c.slip_measured_mm.unwrap_or(0.0)))
         || off(summary.slip_mm - crossed, 0.0)
         || (summary.travel_mm - travel_mm).abs() > END_MM
         || wide && !limits.contains(&Limit::GapWide.code())
+}
+
+fn opened_wide(summary: &Summary) -> bool {
+    summary.max_gap_mm > GAP * summary.gap_ref_mm && summary.gap_ref_mm > 0.0
 }
 
 /// Crossings with gross slip; a run that slipped only elsewhere counts as one.
@@ -249,6 +258,17 @@ mod tests {
         let missing = limit(Limit::StepMissing.code());
         assert!(!silent(Summary { limits: vec![missing], ..short.clone() }));
         assert!(!silent(Summary { faults: vec![limit(121)], ..short }));
+    }
+
+    #[test]
+    fn a_fault_that_stops_a_sound_run_is_counted() {
+        let sound = |summary: Summary| RunLine::new(summary, 1.0, 80.0).stopped_sound;
+        let faults = vec![limit(136)];
+        let stopped = Summary { faults, max_gap_mm: 2.7, gap_ref_mm: 2.66, ..Summary::default() };
+        assert!(sound(stopped.clone()));
+        assert!(!sound(Summary { faults: Vec::new(), ..stopped.clone() }));
+        assert!(!sound(Summary { slip_mm: 0.6, ..stopped.clone() }));
+        assert!(!sound(Summary { max_gap_mm: 3.0, ..stopped }));
     }
 
     #[test]

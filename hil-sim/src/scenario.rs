@@ -58,6 +58,9 @@ const ADVERSARIAL_HEIGHT_MM: f64 = 0.5;
 /// and a load of more than twice the one that is known.
 const ADVERSARIAL: &[(&str, (f64, f64))] = &[("friction", (0.6, 1.1)), ("weight_n", (0.0, 8.0))];
 
+/// Most draws of a seed: what is refused as often is refused for what is stated.
+const DRAWS: u64 = 64;
+
 impl Scenario {
     /// The scenario of a preset: its rig, with the usual spread and noise.
     ///
@@ -142,22 +145,31 @@ impl Scenario {
     /// The plant of the scenario's seed.
     #[must_use]
     pub fn plant(&self) -> PlantParameters {
+        self.plant_with(&self.drawn_mismatch())
+    }
+
+    fn plant_with(&self, mismatch: &Mismatch) -> PlantParameters {
         let (seed, mut spread) = (self.run.seed, self.spread.clone());
         if self.run.mismatch == MismatchDraw::Adversarial {
             spread.step_height_mm = spread.step_height_mm.max(ADVERSARIAL_HEIGHT_MM);
         }
         PlantParameters::draw(&self.rig, &self.true_steps(), &spread, &self.noise, seed)
-            .with_mismatch(&self.drawn_mismatch())
+            .with_mismatch(mismatch)
     }
 
-    /// The mismatch of the scenario's seed: as stated, or drawn wide. Seed 0 draws none.
+    /// The mismatch of the scenario's seed: as stated, or drawn wide. Seed 0 draws none. What
+    /// makes no wheel, such as a tread too thin for its load, is drawn again.
     #[must_use]
     pub fn drawn_mismatch(&self) -> Mismatch {
-        match (self.run.mismatch, self.run.seed) {
-            (MismatchDraw::Wide, seed @ 1..) => self.mismatch.draw(seed, &[]),
-            (MismatchDraw::Adversarial, seed @ 1..) => self.mismatch.draw(seed, ADVERSARIAL),
-            _ => self.mismatch.clone(),
-        }
+        let beyond = match self.run.mismatch {
+            MismatchDraw::Wide if self.run.seed > 0 => &[],
+            MismatchDraw::Adversarial if self.run.seed > 0 => ADVERSARIAL,
+            _ => return self.mismatch.clone(),
+        };
+        let draw = |again: u64| self.mismatch.draw(self.run.seed ^ again << 48, beyond);
+        let rolls =
+            |mismatch: &Mismatch| self.plant_with(mismatch).check(self.rig.preload.limit_n).is_ok();
+        (0..DRAWS).map(draw).find(rolls).unwrap_or_else(|| draw(0))
     }
 
     /// Steps of the nominal plant, ascending: position, mm, and how much higher than the

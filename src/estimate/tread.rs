@@ -172,10 +172,22 @@ pub struct Shown {
 }
 
 impl Shown {
+    /// Load measured over meant of the rolling wheel that the arm presses by `thrust`, N, more.
+    fn rolled_under(self, thrust: Newtons) -> Ratio {
+        self.rolled + divide(self.rolled * thrust, self.pressed)
+    }
+
+    /// Whether the compression may be that of a wheel that the arm presses by `thrust`, N, more than
+    /// was known: rubber within its tolerance does not hide that.
+    pub fn bears(self, thrust: Newtons) -> bool {
+        let off = |ratio: Ratio| (ratio - Ratio::ONE).abs();
+        off(self.rolled_under(thrust)) < off(self.rolled) + BAND
+    }
+
     /// Stiffness to expect of the first crossing, over the known one; 1 while nothing speaks
     /// against that. The arm presses the wheel by `thrust`, N, more than was known.
     pub fn stiffness(self, thrust: Newtons) -> Ratio {
-        let rolled = self.rolled + divide(self.rolled * thrust, self.pressed);
+        let rolled = self.rolled_under(thrust);
         let beyond = divide(self.rest, rolled) - RATIO_WITHIN;
         let coupled = Ratio::ONE + beyond.max(Q16::ZERO) * PER_RATIO;
         if rolled < SOFT {
@@ -515,6 +527,25 @@ mod tests {
                 _ => coupled,
             };
             prop_assert!((got - exact).abs() < 1e-3, "{got} {exact}");
+        }
+    }
+
+    #[test]
+    fn a_load_that_presses_the_wheel_shows_in_the_tread() {
+        let shown = |rolled: f64| Shown {
+            rest: Q16::ONE,
+            rolled: Q16::from_num(rolled),
+            pressed: q16(20_000_000),
+            load: None,
+            load_sigma: Q16::ONE,
+        };
+        // A tread as known bears what presses it by a fifth; a load that presses by 8 N without
+        // being in the known force shows as a tread that is softer by as much.
+        for (rolled, thrust, bears) in
+            [(1.0, 4, true), (1.0, 5, false), (0.71, 8, true), (1.0, -5, false), (1.2, 5, false)]
+        {
+            let by = Q16::from_num(thrust);
+            assert_eq!(shown(rolled).bears(by), bears, "{rolled} {thrust}");
         }
     }
 

@@ -12,7 +12,7 @@ pub(crate) const CLIMB_PART: f64 = 0.9;
 
 /// Preload above the limit that counts as overpressure, relative: regulation and the spring that
 /// a climb compresses stay below it.
-pub(crate) const OVERPRESSURE_PART: f64 = 0.10;
+pub const OVERPRESSURE_PART: f64 = 0.10;
 
 /// Preload kept free below the limit for regulation, relative to the limit, beside the error of the
 /// preload sensor: the spring's compression in a climb beyond the feed-forward. On the presets no

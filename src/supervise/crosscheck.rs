@@ -197,18 +197,29 @@ pub(super) struct Compared {
     pub(super) effort: Option<Ratio>,
 }
 
+/// Distance off its reference within two spans that is a fault, mm.
+#[allow(clippy::float_arithmetic, reason = "SI to machine units, once at start")]
+pub fn off_reference_mm(rig: &Rig) -> f64 {
+    OFF_MM + OFF_COUNTS * count_mm(rig)
+}
+
+/// Travel of a count of the encoder, mm.
+#[allow(clippy::float_arithmetic, reason = "SI to machine units, once at start")]
+fn count_mm(rig: &Rig) -> f64 {
+    2.0 * core::f64::consts::PI * rig.rig.wheel_radius_mm / rig.sense.encoder_counts
+}
+
 impl CrossCheck {
     /// Thresholds of a rig.
     #[allow(clippy::float_arithmetic, reason = "SI to machine units, once at start")]
     pub(super) fn try_build(rig: &Rig) -> Result<Self, RigError> {
-        let turn_mm = 2.0 * core::f64::consts::PI * rig.rig.wheel_radius_mm;
-        let count_mm = turn_mm / rig.sense.encoder_counts;
+        let count_mm = count_mm(rig);
         let counts = |mm: f64| checked("sense.encoder_counts", mm);
         let late = SHORT_LATENCIES * rig.preload.slew_n_per_s * rig.preload_latency_s();
         let short = late.max(SHORT_PART * rig.preload.cruise_n);
         Ok(Self {
             bent: counts(BENT_COUNTS * count_mm)?,
-            off: counts(OFF_MM + OFF_COUNTS * count_mm)?,
+            off: counts(off_reference_mm(rig))?,
             progress: counts(PROGRESS_COUNTS * count_mm)?,
             start_lag: counts(START_LAG_MM)?,
             lag: counts(LAG_MM + PROGRESS_COUNTS * count_mm)?,

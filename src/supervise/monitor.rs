@@ -16,7 +16,7 @@ use crate::units::{
 };
 
 /// Ticks that overpressure must last, longer than noise.
-const OVERPRESSURE_TICKS: u16 = 10;
+pub const OVERPRESSURE_TICKS: u16 = 10;
 /// Speed of a wheel whose bridge is off, mm/s: the observer's ringing is less.
 const BEYOND: MillimetresPerSecond = q16(5_000_000);
 /// Ticks that this must last.

@@ -4,12 +4,12 @@ use super::{Controller, Event, State, Telemetry, TickContext};
 use crate::control::schedule::Targets;
 use crate::estimate::crossing::Contact;
 use crate::estimate::{ContactStage, Findings, Shown};
-use crate::fault::Limit;
+use crate::fault::{Fault, Limit};
 use crate::model::planner::{KNOWN_SCALE, SHOWN_DEVIATION};
 use crate::model::{Learned, Review};
 use crate::numeric::part;
 use crate::supervise::{Leg, Mode};
-use crate::units::{Duty, MotorCommand, Q16, Ratio, q16};
+use crate::units::{Duty, MotorCommand, Q16, q16};
 
 use super::state::Approach;
 
@@ -45,9 +45,8 @@ impl Controller {
                 slipped: open.slip.lost > Q16::ZERO,
             });
         }
-        let shown = found.shown.is_some_and(|shown| {
-            self.learn(&mut state.planning.learned, &shown, tick.sensed.tan_arm)
-        });
+        let shown =
+            found.shown.is_some_and(|shown| self.learn(&mut state.planning.learned, &shown, tick));
         if found.replan || shown {
             self.ask(state, tick);
         }
@@ -57,8 +56,9 @@ impl Controller {
     }
 
     /// What the tread and the drive have shown before the first crossing; whether it is other than
-    /// known. What a crossing has shown of the tread goes before it.
-    fn learn(&self, learned: &mut Learned, shown: &Shown, tan_arm: Ratio) -> bool {
+    /// known. What a crossing has shown of the tread goes before it. A load that the tread does not
+    /// bear is none: duty and speed of the drive do not match.
+    fn learn(&self, learned: &mut Learned, shown: &Shown, tick: &mut TickContext<'_>) -> bool {
         let before = learned.extra_load;
         if let Some(load) = shown.load {
             // Within two sigmas of it, the known load is the better one.
@@ -67,7 +67,11 @@ impl Controller {
             learned.extra_load = if within { Q16::ZERO } else { extra };
         }
         let reloaded = learned.extra_load - before;
-        let stiffness = shown.stiffness(reloaded * self.arm_coupling * tan_arm);
+        let thrust = reloaded * self.arm_coupling * tick.sensed.tan_arm;
+        if !shown.bears(thrust) {
+            tick.fail(Fault::DutyMismatch);
+        }
+        let stiffness = shown.stiffness(thrust);
         let stiffer = learned.scale == Q16::ONE && stiffness > Q16::ONE;
         if stiffer {
             learned.scale = stiffness;

@@ -289,7 +289,7 @@ fn watched(
         _ if restart.is_some() => Finding::Found,
         _ => Finding::Undetected,
     };
-    let report = judge.fault.or_else(|| judge.new_limit(&twin.limits));
+    let report = judge.report(&twin.limits);
     let times = board.bench.fault_times();
     let reported_s = match report {
         Some((at_s, _)) => Some(at_s),

@@ -122,6 +122,7 @@ fn human(outcome: &Matrix) -> String {
         "fault",
         "code",
         "found",
+        "found as\nelse",
         "tolerated",
         "missed",
         "unsafe",
@@ -131,9 +132,10 @@ fn human(outcome: &Matrix) -> String {
         "motion\nmm",
     ];
     let mut text = format!(
-        "{} faults at {} instants each: {} undetected, {} unsafe\n{}\n",
+        "{} faults at {} instants each: {} found as something else, {} undetected, {} unsafe\n{}\n",
         outcome.matrix.len(),
         outcome.instants,
+        outcome.otherwise,
         outcome.undetected,
         outcome.unheld,
         plain(&head, outcome.matrix.iter().map(row))
@@ -161,6 +163,7 @@ fn row(line: &MatrixRow) -> Vec<String> {
         line.fault.clone(),
         line.code.map_or_else(|| line.restarted().unwrap_or("-").to_owned(), |c| c.to_string()),
         count(line.found + line.limited),
+        count(line.otherwise),
         count(line.tolerated),
         count(line.undetected),
         count(line.unheld),

@@ -74,17 +74,16 @@ pub(super) fn human(outcome: &montecarlo::Outcome) -> String {
         let code = fault.code.map_or("failure".to_owned(), |code| format!("fault {code}"));
         text += &format!("  {code} in seed {}: {}\n", fault.seed, fault.text);
     }
-    if !outcome.incomplete.is_empty() {
-        let seeds: Vec<String> = outcome.incomplete.iter().map(u64::to_string).collect();
-        text += &format!("  incomplete: seeds {}\n", seeds.join(", "));
-    }
-    if !outcome.silent.is_empty() {
-        let seeds: Vec<String> = outcome.silent.iter().map(u64::to_string).collect();
-        text += &format!("  of these without a word: seeds {}\n", seeds.join(", "));
-    }
-    if !outcome.unreported.is_empty() {
-        let seeds: Vec<String> = outcome.unreported.iter().map(u64::to_string).collect();
-        text += &format!("  slip, end or gap wrong and unreported: seeds {}\n", seeds.join(", "));
+    for (what, seeds) in [
+        ("incomplete", &outcome.incomplete),
+        ("of these without a word", &outcome.silent),
+        ("slip, end or gap wrong and unreported", &outcome.unreported),
+        ("stopped by a fault without slip or wide gap", &outcome.stopped_sound),
+    ] {
+        if !seeds.is_empty() {
+            let seeds: Vec<String> = seeds.iter().map(u64::to_string).collect();
+            text += &format!("  {what}: seeds {}\n", seeds.join(", "));
+        }
     }
     if !outcome.drawn.is_empty() {
         let rows = outcome

@@ -181,7 +181,7 @@ fn watched(scenario: &Scenario, twin: &Twin) -> Result<Instant, RunError> {
     }
     let (gap_part, crossed) = crossed(session.plant(), twin, worst_mm);
     let finding = judge.finding(&twin.limits, gap_part, crossed);
-    let report = judge.fault.or_else(|| judge.new_limit(&twin.limits));
+    let report = judge.report(&twin.limits);
     let at_s = session.struck_s();
     let since = |from_s: Option<f64>| {
         let ((to_s, _), from_s) = (report?, from_s?);

@@ -2,33 +2,33 @@
 //! was the mechanism held, did it move uncommanded, was the fault reported.
 
 use interstage::fault::{Fault, Limit};
+use interstage::rig::{OVERPRESSURE_PART, Rig};
 use interstage::supervise::Mode;
+use interstage::supervise::{OVERPRESSURE_TICKS, off_reference_mm};
 use interstage::tick::{Event, Output};
 use interstage::units::Direction;
 use serde::Serialize;
 
+use crate::plant::draw::STOP_ROOM_MM;
 use crate::plant::rig::Truth;
-use crate::scenario::Scenario;
-use crate::scenario::injection::{Kind, Target};
+use crate::scenario::injection::{Kind, Target, entry};
+use crate::scenario::{Scenario, StepAnomaly};
 
 /// Control period, s.
 const TICK_S: f64 = 1e-3;
-/// Preload that a run may reach, parts of its limit: what a preload sensor that reads a sixth too
-/// little makes of it. The screw has its own stop at 1.25, what the parts are made for.
-pub const PRELOAD_PART: f64 = 1.20;
-/// Distance that the wheel may move uncommanded, mm: either direction added, until it rests.
-pub const MOTION_MM: f64 = 0.75;
-/// Distance that a wheel may slide that has lost half its grip, mm: the run over a corner, which no
-/// bridge can hold it on.
-pub const SLIDE_MM: f64 = 14.0;
 /// Part of its reference beyond which motion is uncommanded, and a constant, mm/s: half as
 /// fast again as asked is a wrong speed, but the one commanded.
 const BEYOND: (f64, f64) = (1.6, 3.0);
-/// How far from the end of travel a run that says it arrived may be, mm: the room before
-/// the end stop, which is where one ends whose encoder went wrong on the last millimetres.
-pub const POSITION_MM: f64 = 2.6;
 /// Gap that a run may have which reports nothing, parts of the reference gap.
-pub const GAP_PART: f64 = 1.25;
+pub const GAP_PART: f64 = 1.1;
+/// Limits that report what the controller does about its task, not that anything is wrong.
+const OPERATIONAL: [Limit; 5] = [
+    Limit::PreloadLimited,
+    Limit::SpeedFloor,
+    Limit::ResonanceAvoided,
+    Limit::PreloadWait,
+    Limit::SlipMarginLow,
+];
 /// Speed that counts as rest, mm/s.
 const REST_MM_S: f64 = 0.01;
 
@@ -36,10 +36,12 @@ const REST_MM_S: f64 = 0.01;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Finding {
-    /// A fault was latched.
+    /// A fault that names it was latched.
     Found,
-    /// A limit was reported that the same run without the fault does not report.
+    /// A limit that names it was reported, and not by the same run without the fault.
     Limited,
+    /// It was reported, but as something else.
+    Otherwise,
     /// Nothing was reported, and the run ended as it should, within all bounds.
     Tolerated,
     /// Nothing was reported, and the run left a bound or did not end as it reports.
@@ -47,10 +49,47 @@ pub enum Finding {
     Undetected,
 }
 
+/// Bounds of the mechanism, which follow from the rig.
+#[derive(Clone, Copy, Debug)]
+struct Bounds {
+    preload_n: f64,
+    motion_mm: f64,
+    end_mm: f64,
+}
+
+impl Bounds {
+    /// - Preload: that at which 120 trips, of a sensor that reads too little by its stated error,
+    ///   and what the screw adds at its full slew while the fault is confirmed and in its own dead
+    ///   time and lag. The screw's stop, at 1.25 of the limit, is farther.
+    /// - Motion: what the wheel may be off its reference before 123 is reported, and the distance
+    ///   in which it coasts from the largest speed with the motor's time constant,
+    ///   `m v_0 / F_stall`. A wheel that slips may slide off the corner it is on, by its run over
+    ///   that, `sqrt(R^2 - (R - h)^2)`, which no bridge can hold it on.
+    /// - End: the room before the end stop, where a wheel ends whose encoder went wrong on the
+    ///   last millimetres.
+    fn of(rig: &Rig, slips: bool) -> Self {
+        let (preload, drive, rig_mm) = (&rig.preload, &rig.drive, &rig.rig);
+        let trips_n = preload.limit_n * (1.0 + OVERPRESSURE_PART) / (1.0 - rig.sense.preload_error);
+        let late_s = f64::from(OVERPRESSURE_TICKS) * TICK_S + rig.preload_latency_s();
+        let mass_kg = drive.reflected_mass_kg + rig.plant.moved_mass_kg;
+        let coasts_s = 1e-3 * mass_kg * drive.no_load_speed_mm_s / drive.stall_force_n;
+        let over = rig_mm.wheel_radius_mm - rig_mm.step_height_mm;
+        let run_mm = (rig_mm.wheel_radius_mm.powi(2) - over * over).sqrt();
+        let stops_mm = off_reference_mm(rig) + drive.cruise_speed_mm_s * coasts_s;
+        Self {
+            preload_n: trips_n + preload.slew_n_per_s * late_s,
+            motion_mm: if slips { run_mm } else { stops_mm },
+            end_mm: STOP_ROOM_MM,
+        }
+    }
+}
+
 /// The record of a run under judgement.
 #[derive(Clone, Debug)]
 pub struct Judge {
-    limit_n: f64,
+    bounds: Bounds,
+    /// Codes that name what was injected; none if all do.
+    codes: Option<&'static [u16]>,
     ends_mm: (f64, f64),
     /// Largest distance from the end while it reported arrival, mm.
     off_mm: f64,
@@ -67,8 +106,6 @@ pub struct Judge {
     /// Since when both bridges have been off and nothing has moved, s.
     pub rest_s: Option<f64>,
     mode: Mode,
-    /// Distance that it may move uncommanded, mm.
-    most_mm: f64,
     /// Commands came at random: any rest is a right end.
     commanded: bool,
     /// What was injected is a reset of this kind.
@@ -84,8 +121,12 @@ impl Judge {
         let reset = fault.filter(|fault| fault.target == Target::Reset);
         let slips = target == Some(Target::Wheel);
         let commanded = target == Some(Target::Commands);
+        let entry = fault.and_then(|fault| entry(fault.target, fault.kind));
+        let anomaly = scenario.run.anomalies.first().map(StepAnomaly::codes);
+        let codes = entry.map_or(anomaly, |entry| entry.codes);
         Self {
-            limit_n: scenario.rig.preload.limit_n,
+            bounds: Bounds::of(&scenario.rig, slips),
+            codes,
             ends_mm: (0.0, scenario.rig.rig.travel_mm),
             off_mm: 0.0,
             position_mm: truth.position_mm,
@@ -96,7 +137,6 @@ impl Judge {
             limits: Vec::new(),
             rest_s: None,
             mode: Mode::Boot,
-            most_mm: if slips { SLIDE_MM } else { MOTION_MM },
             commanded,
             reset: reset.map(|fault| fault.kind),
         }
@@ -156,15 +196,15 @@ impl Judge {
     #[must_use]
     pub fn harms(&self) -> Vec<String> {
         let mut harms = Vec::new();
-        let most = PRELOAD_PART * self.limit_n;
+        let most = self.bounds.preload_n;
         if self.peak_preload_n > most {
             harms.push(format!("preload {:.1} N, at most {most:.1}", self.peak_preload_n));
         }
-        if self.motion_mm > self.most_mm {
-            let (moved, most) = (self.motion_mm, self.most_mm);
-            harms.push(format!("{moved:.2} mm uncommanded, at most {most}"));
+        if self.motion_mm > self.bounds.motion_mm {
+            let (moved, most) = (self.motion_mm, self.bounds.motion_mm);
+            harms.push(format!("{moved:.2} mm uncommanded, at most {most:.2}"));
         }
-        if self.off_mm > POSITION_MM {
+        if self.off_mm > self.bounds.end_mm {
             harms.push(format!("{:.1} mm from the end it says it reached", self.off_mm));
         }
         if self.rest_s.is_none() {
@@ -186,10 +226,12 @@ impl Judge {
             // The start itself is reported: the judgement is of the rest of the run.
             let ended = matches!(self.mode, Mode::Complete(_)) || self.fault.is_some();
             if ended && !self.false_alarm(kind) { Finding::Found } else { Finding::Undetected }
-        } else if self.fault.is_some() {
+        } else if self.fault.is_some_and(|(_, code)| self.names(code)) {
             Finding::Found
-        } else if self.new_limit(known).is_some() {
+        } else if self.new_limits(known).any(|(_, code)| self.names(code)) {
             Finding::Limited
+        } else if self.report(known).is_some() {
+            Finding::Otherwise
         } else if ended && self.harms().is_empty() && gap_part <= GAP_PART {
             Finding::Tolerated
         } else {
@@ -207,10 +249,24 @@ impl Judge {
             || self.limits.iter().any(|(_, code)| untrue.contains(code))
     }
 
-    /// The first limit that the run without the fault does not report: when, s, and code.
+    fn names(&self, code: u16) -> bool {
+        self.codes.is_none_or(|codes| codes.contains(&code))
+    }
+
+    /// Limits that say that something is wrong, and that the run without the fault does not report.
+    fn new_limits(&self, known: &[u16]) -> impl Iterator<Item = (f64, u16)> {
+        let new = move |(_, code): &(f64, u16)| {
+            !known.contains(code) && OPERATIONAL.iter().all(|limit| limit.code() != *code)
+        };
+        self.limits.iter().copied().filter(new)
+    }
+
+    /// The report that counts, when, s, and its code: the fault or else the first limit, one that
+    /// names what was injected before others.
     #[must_use]
-    pub fn new_limit(&self, known: &[u16]) -> Option<(f64, u16)> {
-        self.limits.iter().find(|(_, code)| !known.contains(code)).copied()
+    pub fn report(&self, known: &[u16]) -> Option<(f64, u16)> {
+        let all = || self.fault.into_iter().chain(self.new_limits(known));
+        all().find(|(_, code)| self.names(*code)).or(all().next())
     }
 
     /// How the run ended, in a word.
@@ -233,6 +289,8 @@ mod tests {
     use interstage::supervise::Leg;
     use interstage::tick::Entry;
     use interstage::units::{MotorCommand, Q16};
+
+    use crate::scenario::injection::Injection;
 
     use super::*;
 
@@ -265,8 +323,9 @@ mod tests {
     #[test]
     fn a_harm_is_named() {
         let hold = Mode::FaultHold(Fault::Overpressure);
+        // 1.1 of 50 N by a sensor that reads 1.5 % too little, and 25 N/s for 10, 80 and 60 ms.
         assert!(judged(hold, 0.0, 0.0, 59.5, 10).harms().is_empty());
-        assert!(judged(hold, 0.0, 0.0, 60.5, 10).harms()[0].starts_with("preload 60.5 N"));
+        assert!(judged(hold, 0.0, 0.0, 59.7, 10).harms()[0].starts_with("preload 59.7 N"));
         assert!(judged(RUN, 8.0, 8.0, 40.0, 10).harms()[0].starts_with("not at rest"));
         let there = Mode::Complete(Direction::Deploy);
         assert!(judged(there, 0.0, 0.0, 40.0, 10).harms()[0].starts_with("80.0 mm from the end"));
@@ -285,6 +344,30 @@ mod tests {
         limited.limits.push((0.1, Limit::StepLate.code()));
         assert_eq!(limited.finding(&[], 1.3, true), Finding::Limited);
         assert_eq!(limited.finding(&[Limit::StepLate.code()], 1.3, true), Finding::Undetected);
+    }
+
+    #[test]
+    fn what_does_not_name_the_fault_is_found_as_something_else() {
+        let finding = |codes: &[u16]| {
+            let mut scenario = Scenario::default();
+            scenario.run.faults = vec![Injection::at(Target::Encoder, Kind::Gain, 0.0, 1.5)];
+            let mut judge = Judge::new(&scenario, &Truth::default());
+            judge.mode = Mode::Complete(Direction::Retract);
+            judge.rest_s = Some(1.0);
+            for code in codes {
+                match code {
+                    ..200 => judge.fault = Some((1.0, *code)),
+                    _ => judge.limits.push((0.5, *code)),
+                }
+            }
+            (judge.finding(&[], 1.0, true), judge.report(&[]).map(|(_, code)| code))
+        };
+        assert_eq!(finding(&[125]), (Finding::Found, Some(125)));
+        assert_eq!(finding(&[136]), (Finding::Otherwise, Some(136)));
+        assert_eq!(finding(&[219]), (Finding::Otherwise, Some(219)));
+        assert_eq!(finding(&[219, 125]), (Finding::Found, Some(125)));
+        // What the controller does about its task names nothing.
+        assert_eq!(finding(&[205]), (Finding::Tolerated, None));
     }
 
     #[test]

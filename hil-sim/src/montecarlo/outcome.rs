@@ -85,6 +85,9 @@ pub struct Outcome {
     /// Seeds of the runs without a fault in which the wheel slipped by over 0.5 mm unnamed, that
     /// ended over 1 mm off, or whose gap was over 1.1 of the reference, with nothing reported.
     pub unreported: Vec<u64>,
+    /// Seeds of the runs that a fault ended although the wheel had slipped by no more than 0.5 mm,
+    /// and no gap was over 1.1 of the reference: false faults are among them.
+    pub stopped_sound: Vec<u64>,
     /// Duration of the completed runs from the accepted command to arrival, s.
     pub duration_s: Option<Quantiles>,
     /// Part of it in which the wheel moved, s.
@@ -130,6 +133,7 @@ impl Outcome {
             incomplete: lines.iter().filter(|line| !line.completed).map(|l| l.seed).collect(),
             silent: lines.iter().filter(|line| line.silent).map(|line| line.seed).collect(),
             unreported: lines.iter().filter(|line| line.unreported).map(|l| l.seed).collect(),
+            stopped_sound: lines.iter().filter(|l| l.stopped_sound).map(|l| l.seed).collect(),
             duration_s: quantiles(figure(&|line| line.duration_s.filter(|_| line.completed))),
             moving_s: quantiles(figure(&|line| line.completed.then_some(line.moving_s))),
             gap_over_ref: quantiles(figure(&|line| line.gap_over_ref)),

@@ -18,7 +18,7 @@ pub const ELEMENTS: usize = 1440;
 
 /// Room between each end of the travel and its stop, mm: the 85 mm of the sliding
 /// connector around 80 mm of travel.
-const STOP_ROOM_MM: f64 = 2.5;
+pub const STOP_ROOM_MM: f64 = 2.5;
 
 /// The parameters of one plant.
 #[derive(Clone, Debug, PartialEq)]

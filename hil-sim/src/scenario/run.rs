@@ -141,6 +141,20 @@ pub enum StepAnomaly {
 }
 
 impl StepAnomaly {
+    /// Codes that name it.
+    #[must_use]
+    pub const fn codes(&self) -> &'static [u16] {
+        match self {
+            Self::Early { .. } => &[201, 124],
+            Self::Late { .. } => &[202, 203, 124],
+            Self::Missing { .. } => &[202, 203, 132],
+            Self::Higher { .. } => &[219],
+            Self::Extra { .. } => &[204],
+        }
+    }
+}
+
+impl StepAnomaly {
     /// Names as written in scenarios.
     pub(super) const NAMES: [&'static str; 5] = ["early", "late", "missing", "higher", "extra"];
 

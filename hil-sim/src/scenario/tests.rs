@@ -265,3 +265,21 @@ fn every_mistake_of_a_fault_is_named() {
     let found = error("[[run.faults]]\nkind = \"off\"\nat_s = 1");
     assert!(found.contains("run.faults[1].target = nothing: expected \"encoder\""), "{found}");
 }
+
+#[test]
+fn what_makes_no_wheel_is_drawn_again() {
+    let draw = |word: &str, seed: u64| {
+        let sets = [format!("run.mismatch={word}"), format!("run.seed={seed}")];
+        Scenario::named("fe").expect("a preset").with(&sets)
+    };
+    for word in ["wide", "adversarial"] {
+        let mut again = 0;
+        for seed in 1..=100 {
+            let scenario = draw(word, seed).expect("a wheel");
+            assert_eq!(scenario.drawn_mismatch(), scenario.drawn_mismatch());
+            let beyond = if word == "wide" { &[] } else { ADVERSARIAL };
+            again += usize::from(scenario.drawn_mismatch() != scenario.mismatch.draw(seed, beyond));
+        }
+        assert!((1..50).contains(&again), "{word}: {again}");
+    }
+}

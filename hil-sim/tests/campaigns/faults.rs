@@ -78,6 +78,26 @@ fn a_run_with_a_fault_of_its_scenario_ends_in_it_and_reports_it() {
 }
 
 #[test]
+fn an_encoder_that_counts_too_few_is_not_taken_for_a_load() {
+    // From before the tread and the drive are judged, at which the duty shows the load.
+    for (seed, at_s) in [(32, 1.211), (35, 1.147)] {
+        let mut scenario = Scenario::default();
+        scenario.run.seed = seed;
+        scenario.run.faults = vec![Injection::at(Target::Encoder, Kind::Gain, at_s, 2.0 / 3.0)];
+        let summary = run(&scenario, Options::default()).expect("a run").summary;
+        let fault = summary.faults.first().expect("a fault");
+        assert!(fault.code == 125 && fault.t_s < at_s + 1.0, "{fault:?}");
+    }
+}
+
+#[test]
+fn the_whole_top_load_on_one_wheel_is_a_load() {
+    let scenario = Scenario::default().with(&["mismatch.weight_n=13.3".to_owned()]);
+    let summary = run(&scenario.expect("in range"), Options::default()).expect("a run").summary;
+    assert!(summary.faults.iter().all(|fault| fault.code != 125), "{:?}", summary.faults);
+}
+
+#[test]
 fn a_compression_sensor_that_is_far_off_from_before_boot_is_reported() {
     let reported = |preset: &str, gain: f64| {
         let mut scenario = Scenario::named(preset).expect("a preset");

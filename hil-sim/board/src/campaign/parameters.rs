@@ -68,7 +68,7 @@ pub(super) fn judged(
     let injection = &scenario.run.faults[0];
     let saving = board.bench.saving();
     let (mut finding, mut end) = (judge.finding(&twin.limits, gap_part, crossed), judge.end());
-    let report = judge.fault.or_else(|| judge.new_limit(&twin.limits));
+    let report = judge.report(&twin.limits);
     let before = injection.from() == Onset::Time(0.0);
     if saving.is_none() && !before {
         power_cycle(&mut board, &mut judge)?;

@@ -52,6 +52,8 @@ pub struct MatrixRow {
     pub found: usize,
     /// Instants with a reported limit.
     pub limited: usize,
+    /// Instants at which it was reported as something else.
+    pub otherwise: usize,
     /// Instants tolerated without a report.
     pub tolerated: usize,
     /// Instants undetected.
@@ -98,6 +100,7 @@ impl MatrixRow {
             safe: unheld == 0,
             found: count(Finding::Found),
             limited: count(Finding::Limited),
+            otherwise: count(Finding::Otherwise),
             tolerated: count(Finding::Tolerated),
             undetected: count(Finding::Undetected),
             unheld,
@@ -129,6 +132,8 @@ pub struct Outcome {
     pub instants: usize,
     /// A row for each fault.
     pub matrix: Vec<MatrixRow>,
+    /// Instants at which a fault was reported as something else.
+    pub otherwise: usize,
     /// Instants at which a fault was neither reported nor tolerated.
     pub undetected: usize,
     /// Instants at which the mechanism was not held.
@@ -140,9 +145,10 @@ impl Outcome {
     /// The outcome of these rows.
     #[must_use]
     pub fn of(target: &'static str, matrix: Vec<MatrixRow>, instants: usize) -> Self {
+        let otherwise = matrix.iter().map(|line| line.otherwise).sum();
         let undetected = matrix.iter().map(|line| line.undetected).sum();
         let unheld = matrix.iter().map(|line| line.unheld).sum();
-        Self { target, instants, matrix, undetected, unheld }
+        Self { target, instants, matrix, otherwise, undetected, unheld }
     }
 
     /// Whether every fault was found or tolerated and every bound kept.

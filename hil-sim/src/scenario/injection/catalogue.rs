@@ -20,6 +20,32 @@ pub struct Entry {
     pub unit: &'static str,
     /// What happens.
     pub text: &'static str,
+    /// Codes that name it; none where every report does, as where a restart reports it.
+    pub codes: Option<&'static [u16]>,
+}
+
+/// Codes of faults and limits that name such a part. Two that are compared share a code.
+const fn codes(target: Target) -> Option<&'static [u16]> {
+    use Target::*;
+    Some(match target {
+        Encoder | EncoderLineA | EncoderLineB => &[101, 122, 123, 124, 125, 126, 131],
+        PreloadSensor | PreloadSensorConverter => &[102, 112, 116, 120, 121, 127, 212],
+        CompressionSensor | TreadConverter => &[103, 113, 117, 208, 211, 212],
+        Angle | AngleBus | Magnet => &[104, 106, 114, 126, 131],
+        Readback => &[105, 128, 129],
+        DriveReadback => &[105, 128],
+        PretightenerReadback => &[105, 129],
+        Drive => &[122, 123, 125, 128],
+        Pretightener => &[120, 121, 127, 129],
+        Wheel => &[126, 133, 136, 218],
+        Tread => &[208, 211, 212],
+        Spring => &[121, 127],
+        Load => &[125],
+        Tick => &[160],
+        Model => &[141],
+        Log | Commands => &[],
+        _ => return None,
+    })
 }
 
 const fn one(
@@ -30,7 +56,7 @@ const fn one(
     unit: &'static str,
     text: &'static str,
 ) -> Entry {
-    Entry { target, kind, magnitude, range, unit, text }
+    Entry { target, kind, magnitude, range, unit, text, codes: codes(target) }
 }
 
 /// A fault without magnitude.
