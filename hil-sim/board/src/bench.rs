@@ -258,7 +258,6 @@ impl<'a> Bench<'a> {
         self.wiring.connect(self.machine.chip_mut(), now);
     }
 
-    /// The wiring.
     pub const fn wiring(&self) -> &Wiring {
         &self.wiring
     }
@@ -359,7 +358,6 @@ impl<'a> Bench<'a> {
         self.injector.as_ref().map(BoardInjector::times).unwrap_or_default()
     }
 
-    /// The plant.
     pub const fn plant(&self) -> &VirtualRig {
         &self.plant
     }

@@ -52,7 +52,6 @@ const AHEAD: u64 = 2;
 pub struct Firmware<'a> {
     /// The image.
     pub elf: &'a [u8],
-    /// Its strings.
     pub strings: &'a Strings,
 }
 

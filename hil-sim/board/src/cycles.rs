@@ -94,7 +94,6 @@ pub enum CyclesError {
 /// Cycles of the control tick over complete runs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct TickCycles {
-    /// Every tick.
     pub tick: Spread,
     /// Ticks on the continuous wall, no step inside the horizon.
     pub smooth: Spread,

@@ -12,7 +12,6 @@ use super::peripherals::flash::Wrong;
 use super::peripherals::pwr::{HOLDS, Then};
 use super::peripherals::rcc::Cause;
 
-/// A fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
     /// An analogue input reads this code, in parts of 2^16: preload sensor (0), compression
@@ -124,7 +123,6 @@ impl Fault {
 pub struct Timed {
     /// From power-up, s.
     pub at_s: f64,
-    /// The fault.
     pub fault: Fault,
 }
 

@@ -34,12 +34,10 @@ pub enum GdbError {
     /// The address cannot be listened at.
     #[error("{address}: {source}")]
     Listen {
-        /// The address.
         address: String,
         /// Why.
         source: io::Error,
     },
-    /// The connection.
     #[error("the debugger's connection failed: {0}")]
     Connection(String),
     /// The board or its plant.

@@ -1,7 +1,7 @@
 //! A measurement image on the core: the host calls its functions and counts their cycles.
 
 use super::core::unicorn::{Access, Counted, Memory, UnicornCore};
-use super::core::{Core, CoreError, Meter, Register, Stop};
+use super::core::{CoreError, Meter, Register, Stop};
 use super::elf::{FLASH, Loaded, RAM, named};
 use super::error::ImageError;
 use super::spread::Spread;

@@ -9,7 +9,7 @@ mod tasks;
 
 use super::chip::Chip;
 use super::core::unicorn::{Counted, UnicornCore};
-use super::core::{Access, Bus, Core, CoreError, Mark, Register, Stop};
+use super::core::{Access, Bus, CoreError, Mark, Register, Stop};
 use super::elf::{BELOW, FLASH, Loaded, RAM, named};
 use super::error::ImageError;
 use super::exceptions::number::SV_CALL;
@@ -96,7 +96,6 @@ impl Machine {
         Clock { cycles: self.now(), waits: self.waits() }
     }
 
-    /// The chip.
     pub fn chip(&self) -> &Chip {
         self.core.bus()
     }
@@ -137,7 +136,6 @@ impl Machine {
         &self.restarts
     }
 
-    /// The image.
     pub const fn image(&self) -> &Loaded {
         &self.loaded
     }

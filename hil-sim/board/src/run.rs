@@ -18,7 +18,7 @@ use crate::chip::map::PARAMETER_SETS;
 use hil_sim::faults::sets;
 use hil_sim::firmware::Footprint;
 use hil_sim::params::set_of;
-use hil_sim::record::{self, Recording};
+use hil_sim::record::Recording;
 use hil_sim::scenario::injection::{Injection, Target};
 use hil_sim::scenario::{ControllerKind, Scenario};
 
@@ -106,7 +106,7 @@ pub fn run_with(
     if options.wait_states {
         bench.machine_mut().count_waits()?;
     }
-    let mut trace = Trace::new(scenario, bench.plant());
+    let mut trace = Trace::new(bench.plant());
     bench.start_when_idle();
     let started = Instant::now();
     let mut after = AFTER;
@@ -119,7 +119,7 @@ pub fn run_with(
             due.fault.strike(bench.machine_mut())?;
         }
         let waited = bench.waits_to_start();
-        let (passed, lines) = bench.step()?;
+        let (_, lines) = bench.step()?;
         for line in &lines {
             watch(bench.time_s(), line);
         }
@@ -128,14 +128,15 @@ pub fn run_with(
         } else {
             gathered.gather(bench.machine_mut());
         }
-        stream.extend(bench.take_frames());
-        trace.add(&passed, &lines, bench.plant().truth(), options.rows);
+        let frames = bench.take_frames();
+        trace.add(&frames, &lines, bench.plant().truth());
+        stream.extend(frames);
         if trace.is_over() {
             after -= 1;
         }
     }
-    let mut recording = trace.finish(scenario, bench.plant(), started.elapsed().as_secs_f64());
-    record::complete(&mut recording, &record::Run::of_stream(&stream));
+    let wall_s = started.elapsed().as_secs_f64();
+    let mut recording = trace.finish(scenario, bench.plant(), options.rows, wall_s);
     recording.stream = stream;
     let machine = bench.into_machine();
     let stack = stack_used(&machine)?;

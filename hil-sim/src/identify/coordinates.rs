@@ -54,7 +54,6 @@ const EXACT: f64 = 1e-6;
 /// Mean and standard deviation of a coordinate before any log is read.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Prior {
-    /// Mean.
     pub mean: f64,
     /// Standard deviation.
     pub deviation: f64,
@@ -73,7 +72,6 @@ pub struct Coordinates {
 impl Coordinates {
     /// The coordinates of a rig of which only what the scenario states is known; the
     /// tolerances of sensors and wheel are those of its `spread`.
-    #[must_use]
     pub fn of(scenario: &Scenario) -> Self {
         let mut exact = scenario.clone();
         exact.spread = Spread::none();
@@ -111,13 +109,11 @@ impl Coordinates {
     }
 
     /// What is known of each coordinate; their means are where the fit starts.
-    #[must_use]
     pub fn priors(&self) -> &[Prior] {
         &self.priors
     }
 
     /// The same with one coordinate known otherwise, to this deviation.
-    #[must_use]
     pub fn known(&self, index: usize, mean: f64, deviation: f64) -> Self {
         let mut known = self.clone();
         known.priors[index] = Prior { mean, deviation, tolerance: false };
@@ -125,26 +121,22 @@ impl Coordinates {
     }
 
     /// Number of steps.
-    #[must_use]
     pub const fn steps(&self) -> usize {
         self.steps
     }
 
     /// Coordinate of a step's position.
-    #[must_use]
     pub const fn position(&self, step: usize) -> usize {
         STEPS + step
     }
 
     /// Coordinate of a step's height.
-    #[must_use]
     pub const fn height(&self, step: usize) -> usize {
         STEPS + self.steps + step
     }
 
     /// The plant that these numbers describe, for the forward model: its preload comes
     /// from the log, so that it has no spring; its modes are averaged out of the log.
-    #[must_use]
     pub fn plant(&self, x: &[f64]) -> PlantParameters {
         let k_inf = x[STIFFNESS].exp();
         let scale = self.scale(x);
@@ -172,13 +164,11 @@ impl Coordinates {
     }
 
     /// Travel over the travel at the nominal radius.
-    #[must_use]
     pub fn scale(&self, x: &[f64]) -> f64 {
         x[RADIUS] / self.nominal.ring.radius_mm
     }
 
     /// Position of a step, mm, and its variance by this covariance.
-    #[must_use]
     pub fn place(&self, step: usize, x: &[f64], covariance: &DMatrix<f64>) -> (f64, f64) {
         let (index, scale) = (self.position(step), self.scale(x));
         let by_radius = x[index] / self.nominal.ring.radius_mm;
@@ -189,7 +179,6 @@ impl Coordinates {
     }
 
     /// The rig as stated, without mismatch.
-    #[must_use]
     pub const fn nominal(&self) -> &PlantParameters {
         &self.nominal
     }

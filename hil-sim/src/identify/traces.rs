@@ -57,7 +57,6 @@ pub struct Zero {
 /// Mean of a channel over a bin.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Bin {
-    /// Ticks.
     pub ticks: Range<usize>,
     /// Compression without its zero, mm.
     pub compression_mm: f64,
@@ -74,7 +73,6 @@ pub struct Bin {
 /// What the drive did over a bin.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Effort {
-    /// Ticks.
     pub ticks: Range<usize>,
     /// Mean duty.
     pub duty: f64,
@@ -109,9 +107,6 @@ pub struct Traces {
 
 impl Traces {
     /// Prepares a record.
-    ///
-    /// # Errors
-    /// [`IdentifyError::Log`] if the wheel was never pressed or never driven.
     pub fn of(record: &Record) -> Result<Self, IdentifyError> {
         let bad = |why: &str| IdentifyError::Log(record.name.clone(), why.into());
         let samples = &record.samples;

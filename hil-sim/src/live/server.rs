@@ -45,9 +45,6 @@ pub struct Server {
 
 impl Server {
     /// Listens at `address`.
-    ///
-    /// # Errors
-    /// If the address is not available.
     pub fn bind(address: &str) -> io::Result<Self> {
         let listener = TcpListener::bind(address)?;
         let address = listener.local_addr()?;
@@ -64,13 +61,11 @@ impl Server {
     }
 
     /// Where it listens.
-    #[must_use]
     pub const fn address(&self) -> SocketAddr {
         self.address
     }
 
     /// Number of connected clients.
-    #[must_use]
     pub fn clients(&self) -> usize {
         lock(&self.clients).len()
     }

@@ -23,9 +23,6 @@ pub struct ReconnectingPort<'a> {
 
 impl<'a> ReconnectingPort<'a> {
     /// Opens the port by `connect`, and again at most every `pause` when it fails.
-    ///
-    /// # Errors
-    /// [`PortError`] if it cannot be opened the first time.
     pub fn open(
         mut connect: impl FnMut() -> Result<Box<dyn Port + 'a>, PortError> + 'a,
         pause: Duration,

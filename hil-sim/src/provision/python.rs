@@ -10,9 +10,6 @@ use crate::firmware;
 
 /// The Python of the environment `name` in the target directory, which has these packages, each
 /// `name==version`. It is made first if it is missing or has others.
-///
-/// # Errors
-/// If Python 3 with `venv` or the packages are not to be had; one line says why.
 pub fn python(name: &str, packages: &[&str]) -> Result<PathBuf> {
     let folder = firmware::target_directory().join(name);
     let (program, stamp) = (folder.join("bin/python"), folder.join("complete"));

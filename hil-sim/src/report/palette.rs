@@ -3,7 +3,6 @@
 
 use plotters::style::RGBColor;
 
-/// Truth.
 pub const TRUTH: RGBColor = RGBColor(0x1f, 0x29, 0x37);
 /// References; drawn dashed, see [`DASHES`].
 pub const WANTED: RGBColor = RGBColor(0x6b, 0x72, 0x80);
@@ -18,22 +17,16 @@ pub const FACE: RGBColor = RGBColor(0x64, 0x74, 0x8b);
 /// Simulated by the reference models; drawn dashed, see [`DASHES`].
 pub const SIMULATED: RGBColor = RGBColor(0x1c, 0x6f, 0xd6);
 
-/// Speed.
 pub const SPEED: RGBColor = RGBColor(0x1d, 0x7f, 0xe0);
-/// Preload.
 pub const PRELOAD: RGBColor = RGBColor(0xe0, 0x7b, 0x12);
-/// Gap.
 pub const GAP: RGBColor = RGBColor(0xd0, 0x2f, 0x6b);
-/// Radius.
 pub const RADIUS: RGBColor = RGBColor(0x0f, 0x97, 0x97);
-/// Slip.
 pub const SLIP: RGBColor = RGBColor(0x35, 0xa1, 0x4a);
 /// Compression of the tread.
 pub const COMPRESSION: RGBColor = RGBColor(0x80, 0x5a, 0xd5);
 /// Force on the lower wall.
 pub const FLOOR: RGBColor = RGBColor(0x3d, 0x8e, 0xb9);
 
-/// Text.
 pub const TEXT: RGBColor = RGBColor(0x37, 0x41, 0x51);
 /// Axes.
 pub const AXIS: RGBColor = RGBColor(0x9c, 0xa3, 0xaf);

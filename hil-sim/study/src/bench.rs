@@ -46,7 +46,6 @@ pub struct Report {
     pub tick: Option<Tick>,
     /// Why there are no cycles.
     pub cycles_left_out: Option<String>,
-    /// The plant.
     pub plant: Plant,
     /// Other engines and solvers, if they were asked for and available.
     pub peers: Option<Peers>,
@@ -67,7 +66,6 @@ pub struct Plant {
 
 impl Plant {
     /// The default setting's errors and time.
-    #[must_use]
     pub fn usual(&self) -> Option<&Point> {
         self.settings.iter().find(|point| {
             (point.elements, point.stride_mm) == (self.default.elements, self.default.stride_mm)
@@ -76,9 +74,6 @@ impl Plant {
 }
 
 /// Measures; `say` is called with each part's name.
-///
-/// # Errors
-/// If the model cannot be built, a crossing cannot be balanced, or core and host differ.
 pub fn measure(options: Options, say: &dyn Fn(&str)) -> Result<Report> {
     let one_line = |error: &anyhow::Error| Some(format!("{error:#}").replace('\n', " "));
     say("reduced model");

@@ -29,7 +29,7 @@ use unicorn_engine::{
 
 use self::count::Count;
 use super::{
-    Access as Touch, Bus, Core, CoreError, Fault, Mark, Meter, NoBus, Register, Stop, passes,
+    Access as Touch, Bus, CoreError, Fault, Mark, Meter, NoBus, Register, Stop, passes,
 };
 use crate::timing;
 
@@ -112,7 +112,6 @@ pub struct UnicornCore<B: Bus + 'static = NoBus> {
     guards: Vec<(u32, u32)>,
     /// Hooks of deferred instructions, by their addresses.
     own: Vec<(u32, UcHookId)>,
-    /// The hook of all of them.
     common: Option<UcHookId>,
     /// The hook of reads of spoilt flash.
     reads: Option<UcHookId>,
@@ -174,7 +173,6 @@ impl<B: Bus + 'static> UnicornCore<B> {
         Ok(core)
     }
 
-    /// The bus.
     pub fn bus(&self) -> &B {
         &self.engine.get_data().bus
     }
@@ -361,12 +359,15 @@ fn name(register: Register) -> i32 {
     }
 }
 
-impl<B: Bus + 'static> Core for UnicornCore<B> {
-    fn read(&self, address: u32, into: &mut [u8]) -> Result<(), CoreError> {
+/// Every method fails if the engine refuses, as for an address without memory.
+impl<B: Bus + 'static> UnicornCore<B> {
+    /// Reads memory.
+    pub fn read(&self, address: u32, into: &mut [u8]) -> Result<(), CoreError> {
         engine("read memory", self.engine.mem_read(address.into(), into))
     }
 
-    fn write(&mut self, address: u32, bytes: &[u8]) -> Result<(), CoreError> {
+    /// Writes memory, flash too.
+    pub fn write(&mut self, address: u32, bytes: &[u8]) -> Result<(), CoreError> {
         engine("write memory", self.engine.mem_write(address.into(), bytes))?;
         let count = &self.engine.get_data().count;
         if (address.wrapping_sub(count.base) as usize) < count.bytes.len() {
@@ -377,12 +378,13 @@ impl<B: Bus + 'static> Core for UnicornCore<B> {
         Ok(())
     }
 
-    fn register(&self, register: Register) -> Result<u32, CoreError> {
+    /// A register's value.
+    pub fn register(&self, register: Register) -> Result<u32, CoreError> {
         let value = engine("read a register", self.engine.reg_read(name(register)))?;
         Ok(value as u32)
     }
 
-    fn set_register(&mut self, register: Register, value: u32) -> Result<(), CoreError> {
+    pub fn set_register(&mut self, register: Register, value: u32) -> Result<(), CoreError> {
         let uc = &mut self.engine;
         if register == Register::Xpsr {
             // The first name sets every field; only the second makes the engine apply the new
@@ -394,11 +396,14 @@ impl<B: Bus + 'static> Core for UnicornCore<B> {
         engine("set a register", uc.reg_write(name(register), value.into()))
     }
 
-    fn run(&mut self, address: u32, cycles: u64) -> Result<Stop, CoreError> {
+    /// Runs from `address` until something stops the core, `cycles` at most.
+    pub fn run(&mut self, address: u32, cycles: u64) -> Result<Stop, CoreError> {
         self.go(address, cycles, (u64::MAX, 0))
     }
 
-    fn step(&mut self, address: u32) -> Result<Stop, CoreError> {
+    /// Executes the instruction at `address`, or the conditional block that begins there. Slow:
+    /// the engine translates again.
+    pub fn step(&mut self, address: u32) -> Result<Stop, CoreError> {
         let before = self.meter();
         engine("forget code", self.engine.ctl_flush_tb())?;
         let stop = self.go(address, 1, (u64::MAX, 1))?;
@@ -414,7 +419,8 @@ impl<B: Bus + 'static> Core for UnicornCore<B> {
         })
     }
 
-    fn run_to(&mut self, address: u32, cycles: u64, until: u32) -> Result<Stop, CoreError> {
+    /// The same, or until the program gets to `until`. Slow: the engine translates again.
+    pub fn run_to(&mut self, address: u32, cycles: u64, until: u32) -> Result<Stop, CoreError> {
         engine("forget code", self.engine.ctl_flush_tb())?;
         let stop = self.go(address, cycles, (u64::from(until & !1), 0))?;
         engine("forget code", self.engine.ctl_flush_tb())?;
@@ -424,19 +430,23 @@ impl<B: Bus + 'static> Core for UnicornCore<B> {
         })
     }
 
-    fn pass(&mut self, cycles: u64) {
+    /// Lets time pass in which no instruction is executed.
+    pub fn pass(&mut self, cycles: u64) {
         self.engine.get_data_mut().count.meter.cycles += cycles;
     }
 
-    fn meter(&self) -> Meter {
+    /// Cycles and instructions so far.
+    pub fn meter(&self) -> Meter {
         self.engine.get_data().count.meter
     }
 
-    fn mark(&mut self, address: u32) {
+    /// Notes from now on when the program gets to this address.
+    pub fn mark(&mut self, address: u32) {
         self.engine.get_data_mut().count.mark(address & !1);
     }
 
-    fn take_marks(&mut self, marks: &mut Vec<Mark>) {
+    /// Moves the notes since the last call into `marks`, in their order.
+    pub fn take_marks(&mut self, marks: &mut Vec<Mark>) {
         marks.append(&mut self.engine.get_data_mut().marks);
     }
 }

@@ -1,7 +1,7 @@
 //! Access of a debug probe to memory and core registers.
 
 use super::Machine;
-use crate::core::{Core, CoreError, Register};
+use crate::core::{CoreError, Register};
 use crate::elf::FLASH;
 use crate::peripherals::flash::Wrong;
 

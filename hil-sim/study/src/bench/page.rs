@@ -10,7 +10,6 @@ use crate::figure::{Figure, Panel, Series};
 use crate::figure_svg::svg;
 
 /// The page and its plots: names below `docs`, and texts.
-#[must_use]
 pub fn files(report: &Report) -> Vec<(&'static str, String)> {
     let mut files = vec![
         ("PERFORMANCE.md", page(report)),
@@ -82,7 +81,6 @@ fn peers_panel(peers: &Peers) -> Panel {
 }
 
 /// The tables of a measurement.
-#[must_use]
 pub fn tables(report: &Report) -> String {
     let mut text = format!("{}{}", model_table(report), plant_table(report));
     if let Some(peers) = &report.peers {

@@ -49,7 +49,6 @@ pub struct Setting {
     pub elements: Option<usize>,
     /// Relative and absolute tolerance of a solver.
     pub tolerance: Option<f64>,
-    /// Time step, s.
     pub time_step_s: Option<f64>,
     /// Gap, mm, if the wheel lifted off.
     pub gap_mm: Option<f64>,
@@ -131,9 +130,6 @@ fn crossing(preload_n: f64, mesh: Mesh) -> Result<CrossingResult, BalanceError> 
 }
 
 /// Runs the comparison; what it needs is set up first, under the target directory.
-///
-/// # Errors
-/// If Python or a package is not available, or a script fails.
 pub fn compare(say: &dyn Fn(&str)) -> Result<Peers> {
     let python = python::provide(say)?;
     say("converged ring");
@@ -255,9 +251,6 @@ fn least_seconds(settings: &[Setting]) -> Vec<(String, Option<f64>)> {
 
 impl Peers {
     /// Least error of SciPy's solvers: how far two independent solutions agree.
-    ///
-    /// # Errors
-    /// If none was run.
     pub fn agreement(&self) -> Result<f64> {
         let solvers = self.settings.iter().filter(|s| s.tolerance.is_some());
         let errors = solvers.filter_map(|s| s.error);
