@@ -88,7 +88,11 @@ impl Tally {
     }
 
     /// The record of the run; `line` makes a line of its ledger.
-    pub(super) fn finish(self, ended: &Ended<'_>, line: impl Fn(&Crossing) -> CrossingLine) -> Recording {
+    pub(super) fn finish(
+        self,
+        ended: &Ended<'_>,
+        line: impl Fn(&Crossing) -> CrossingLine,
+    ) -> Recording {
         let Ended { target, scenario, plant, arrived, wall_s } = *ended;
         let truth = plant.truth();
         let steps = plant.parameters().wall.steps().len();

@@ -115,9 +115,7 @@ pub enum StepAnomaly {
         offset_mm: f64,
     },
     /// The step is not there.
-    Missing {
-        step: u8,
-    },
+    Missing { step: u8 },
     /// The step is higher than the table says.
     Higher {
         step: u8,

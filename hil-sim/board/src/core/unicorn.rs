@@ -28,9 +28,7 @@ use unicorn_engine::{
 };
 
 use self::count::Count;
-use super::{
-    Access as Touch, Bus, CoreError, Fault, Mark, Meter, NoBus, Register, Stop, passes,
-};
+use super::{Access as Touch, Bus, CoreError, Fault, Mark, Meter, NoBus, Register, Stop, passes};
 use crate::timing;
 
 /// Memory of the board.

@@ -35,7 +35,10 @@ pub(super) fn next(core: &UnicornCore<impl Bus + 'static>) -> Result<(u32, u32),
 }
 
 /// Pushes a frame that returns to `back`; false if there is no memory for it.
-pub(super) fn push(core: &mut UnicornCore<impl Bus + 'static>, back: u32) -> Result<bool, CoreError> {
+pub(super) fn push(
+    core: &mut UnicornCore<impl Bus + 'static>,
+    back: u32,
+) -> Result<bool, CoreError> {
     let status = core.register(Register::Xpsr)?;
     let float = core.register(Register::Control)? & FLOAT_CONTEXT != 0;
     let stack = core.register(Register::Sp)?;
@@ -81,7 +84,10 @@ pub(super) fn go_to_handler(
 }
 
 /// Sets the status for the handler of exception `number`.
-pub(super) fn change_handler(core: &mut UnicornCore<impl Bus + 'static>, number: u8) -> Result<(), CoreError> {
+pub(super) fn change_handler(
+    core: &mut UnicornCore<impl Bus + 'static>,
+    number: u8,
+) -> Result<(), CoreError> {
     let status = core.register(Register::Xpsr)?;
     let status = status & !(CONDITIONAL | EXCEPTION) | THUMB | u32::from(number);
     // The engine changes to the main stack with the number.
@@ -90,7 +96,10 @@ pub(super) fn change_handler(core: &mut UnicornCore<impl Bus + 'static>, number:
 
 /// Pops the frame of this return value, and restores its mode. Returns the address at which
 /// the program continues; `None` if the frame is not in memory.
-pub(super) fn pop(core: &mut UnicornCore<impl Bus + 'static>, value: u32) -> Result<Option<u32>, CoreError> {
+pub(super) fn pop(
+    core: &mut UnicornCore<impl Bus + 'static>,
+    value: u32,
+) -> Result<Option<u32>, CoreError> {
     let float = value & RETURN_BASIC == 0;
     let process = value & RETURN_PROCESS != 0;
     let pointer = if process { Register::Psp } else { Register::Sp };
