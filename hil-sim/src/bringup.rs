@@ -186,7 +186,7 @@ pub(crate) struct Session<'a, 'p> {
 }
 
 /// What a power-up proposes: key, value on the board, value measured.
-pub fn proposals(progress: &Progress) -> Vec<(String, String, String)> {
+pub(crate) fn proposals(progress: &Progress) -> Vec<(String, String, String)> {
     let (was, is) = (progress.expected.keys(), progress.proposed.keys());
     let differ = was.into_iter().zip(is).filter(|(was, is)| was.value != is.value);
     differ.map(|(was, is)| (was.key.clone(), was.value.to_string(), is.value.to_string())).collect()

@@ -93,7 +93,7 @@ impl Envelope {
 
     /// Mean of this strategy's time over the scheduled one's, in the cells where both complete
     /// without slip; none without such a cell.
-    pub fn time_ratio(&self, controller: &str, known: bool) -> Option<f64> {
+    pub(crate) fn time_ratio(&self, controller: &str, known: bool) -> Option<f64> {
         let good = || self.cells.iter().filter(move |cell| cell.known == known && cell.good());
         let of = |cell: &Cell, name: &str| cell.controller == name;
         let ratios: Vec<f64> = good()

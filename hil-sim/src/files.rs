@@ -77,7 +77,7 @@ pub fn write_text(path: &Path, text: &str) -> Result<(), FileError> {
 }
 
 /// Makes `directory` and those above it.
-pub fn make_directory(directory: &Path) -> Result<(), FileError> {
+pub(crate) fn make_directory(directory: &Path) -> Result<(), FileError> {
     let what = "cannot make the directory";
     fs::create_dir_all(directory).map_err(|error| FileError {
         path: directory.to_owned(),

@@ -113,7 +113,7 @@ pub(crate) fn could_not_start(command: &Command, source: io::Error) -> FirmwareE
 }
 
 /// Adds the board's target to the toolchain if it is missing.
-pub fn ensure_target() -> Result<(), FirmwareError> {
+pub(crate) fn ensure_target() -> Result<(), FirmwareError> {
     // The folder of libraries decides for toolchains with and without rustup.
     let mut rustc = Command::new(tool("RUSTC", "rustc"));
     rustc.args(["--print", "target-libdir", "--target", TARGET]).current_dir(workspace());

@@ -223,7 +223,7 @@ impl FaultInjector {
     }
 
     /// Whether the model task hangs.
-    pub fn model_hangs(&self) -> bool {
+    pub(crate) fn model_hangs(&self) -> bool {
         self.is(Target::Model, Kind::Hung).is_some()
     }
 

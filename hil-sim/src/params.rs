@@ -88,7 +88,7 @@ impl Held {
     }
 
     /// Whether its constants are of this program's layout.
-    pub const fn is_current(&self) -> bool {
+    pub(crate) const fn is_current(&self) -> bool {
         self.schema == SCHEMA
     }
 }

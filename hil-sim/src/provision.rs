@@ -69,12 +69,12 @@ pub fn featured(extra: Extra) -> Result<PathBuf, ProvisionError> {
 
 /// Runs that part of `rig`, built first if need be, with the arguments of this process, and
 /// returns its exit code. Standard output is its own.
-pub fn go_on(extra: Extra) -> Result<u8, ProvisionError> {
+pub(crate) fn go_on(extra: Extra) -> Result<u8, ProvisionError> {
     go_on_with(extra, env::args_os().skip(1))
 }
 
 /// The same with these arguments.
-pub fn go_on_with(
+pub(crate) fn go_on_with(
     extra: Extra,
     arguments: impl IntoIterator<Item = OsString>,
 ) -> Result<u8, ProvisionError> {

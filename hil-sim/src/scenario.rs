@@ -83,7 +83,7 @@ impl Scenario {
     }
 
     /// The scenario of a rig that is near this preset's, with the usual spread and noise.
-    pub fn of_rig(preset: &str, rig: Rig) -> Self {
+    pub(crate) fn of_rig(preset: &str, rig: Rig) -> Self {
         Self {
             preset: preset.to_owned(),
             rig,
@@ -133,7 +133,7 @@ impl Scenario {
     }
 
     /// The mismatch of the scenario's seed: as stated, or drawn wide. Seed 0 draws none.
-    pub fn drawn_mismatch(&self) -> Mismatch {
+    pub(crate) fn drawn_mismatch(&self) -> Mismatch {
         match (self.run.mismatch, self.run.seed) {
             (MismatchDraw::Wide, seed @ 1..) => self.mismatch.draw(seed, &[]),
             (MismatchDraw::Adversarial, seed @ 1..) => self.mismatch.draw(seed, ADVERSARIAL),
@@ -204,7 +204,7 @@ impl Scenario {
 }
 
 /// A value as short as it can be written: no decimals without need, no blanks, no quotes.
-pub fn brief(value: &serde_json::Value) -> String {
+pub(crate) fn brief(value: &serde_json::Value) -> String {
     match value {
         serde_json::Value::Number(number) => {
             number.as_f64().map_or_else(|| number.to_string(), |number| number.to_string())

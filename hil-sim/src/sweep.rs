@@ -9,7 +9,7 @@ use serde_json::{Map, Value};
 pub use picture::{Plot, picture};
 
 /// Most places of a grid.
-pub const MOST: usize = 10_000;
+pub(crate) const MOST: usize = 10_000;
 
 /// A key with the values that it takes one after the other.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -56,7 +56,6 @@ pub struct Firmware<'a> {
 }
 
 /// Runs a campaign on the emulated board, as [`Campaign::run`] does in software.
-/// Errors: [`BoardError`] if a run without a fault cannot be made.
 pub fn run(
     campaign: &Campaign,
     firmware: Firmware<'_>,

@@ -63,14 +63,12 @@ pub enum Fault {
 
 impl Fault {
     /// Switches the fault on.
-    /// Errors: [`CoreError`] if the engine fails or there is no memory at the address.
     pub fn strike(self, machine: &mut Machine) -> Result<(), CoreError> {
         self.switch(machine, true)
     }
 
     /// Switches the fault on or off. A single event (a reset, a hang, a flipped bit) is not
     /// undone.
-    /// Errors: as [`Fault::strike`].
     pub fn switch(self, machine: &mut Machine, on: bool) -> Result<(), CoreError> {
         let now = machine.now();
         let chip = machine.chip_mut();

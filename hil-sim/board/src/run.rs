@@ -40,7 +40,6 @@ pub struct Ran {
 }
 
 /// Checks that the firmware can run a scenario.
-/// Errors: [`BoardError::Controller`] if the scenario wants another controller than the firmware's.
 pub fn check(scenario: &Scenario) -> Result<(), BoardError> {
     if scenario.run.controller != ControllerKind::Scheduled {
         return Err(BoardError::Controller(scenario.run.controller.name().to_owned()));
@@ -80,7 +79,6 @@ pub struct RunOptions {
 
 /// Runs a scenario on the board with the image in `elf`, and keeps `rows` if that is true.
 /// `watch` gets each line of the log with its time, s.
-/// Errors: [`BoardError`] if the run cannot be made. A run that ends in a fault is a result.
 pub fn run(
     elf: &[u8],
     scenario: &Scenario,
@@ -91,7 +89,6 @@ pub fn run(
 }
 
 /// The same with all options.
-/// Errors: as [`run`].
 pub fn run_with(
     elf: &[u8],
     scenario: &Scenario,
@@ -145,7 +142,6 @@ pub fn run_with(
 }
 
 /// Bytes of the stack that were used, deepest since power came up.
-/// Errors: [`BoardError`] if the image does not say where its stack is.
 pub fn stack_used(machine: &Machine) -> Result<u32, BoardError> {
     let end = machine.image().symbol("_stack_end")?;
     let start = machine.image().symbol("_stack_start")?;

@@ -58,7 +58,7 @@ impl Progress {
     }
 
     /// Whether a stage has passed.
-    pub fn is_done(&self, stage: Stage) -> bool {
+    pub(crate) fn is_done(&self, stage: Stage) -> bool {
         self.stages.iter().any(|(known, checks)| {
             *known == stage && !checks.is_empty() && checks.iter().all(|check| check.ok)
         })

@@ -97,7 +97,7 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
 }
 
 /// Writes and prints a run.
-pub fn conclude(
+pub(crate) fn conclude(
     args: &Args,
     recording: &Recording,
     directory: Option<&Path>,

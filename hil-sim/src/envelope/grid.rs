@@ -29,12 +29,12 @@ impl Grid {
     pub const USUAL: Self = Self { frictions: 8, loads: 7 };
 
     /// The frictions, ascending.
-    pub fn frictions(self) -> Vec<f64> {
+    pub(crate) fn frictions(self) -> Vec<f64> {
         spread(FRICTION, self.frictions)
     }
 
     /// The loads on the wheel, ascending, N.
-    pub fn loads_n(self) -> Vec<f64> {
+    pub(crate) fn loads_n(self) -> Vec<f64> {
         spread(LOAD_N, self.loads)
     }
 

@@ -16,13 +16,13 @@ use super::noise::Noise;
 use super::record::{Record, Sample, TICK_S};
 
 /// Dead time, ms.
-pub const DELAY: usize = 0;
+pub(crate) const DELAY: usize = 0;
 /// Logarithm of the lag, s.
-pub const LAG: usize = 1;
+pub(crate) const LAG: usize = 1;
 /// Slew, N/s by the preload sensor.
-pub const SLEW: usize = 2;
+pub(crate) const SLEW: usize = 2;
 /// Spring rate, N/mm by the preload sensor.
-pub const SPRING: usize = 3;
+pub(crate) const SPRING: usize = 3;
 /// First of the seats, N, one a log.
 const SEATS: usize = 4;
 

@@ -10,9 +10,9 @@ use crate::plant::wall::{Step, Wall};
 use crate::scenario::Scenario;
 
 /// Relaxed stiffness, logarithm.
-pub const STIFFNESS: usize = 0;
+pub(crate) const STIFFNESS: usize = 0;
 /// Stiffening, logarithm.
-pub const STIFFENING: usize = 1;
+pub(crate) const STIFFENING: usize = 1;
 /// Relaxation time, logarithm.
 pub const TAU: usize = 2;
 /// Friction, logarithm.
@@ -20,17 +20,17 @@ pub const FRICTION: usize = 3;
 /// Axial load on the wheel, logarithm.
 pub const LOAD: usize = 4;
 /// Friction of the gearbox, N at the tread.
-pub const GEARBOX: usize = 5;
+pub(crate) const GEARBOX: usize = 5;
 /// Wheel radius, mm.
 pub const RADIUS: usize = 6;
 /// Gain of the preload sensor over nominal, logarithm.
-pub const LOAD_GAIN: usize = 7;
+pub(crate) const LOAD_GAIN: usize = 7;
 /// Gain of the compression sensor over nominal, logarithm.
-pub const TREAD_GAIN: usize = 8;
+pub(crate) const TREAD_GAIN: usize = 8;
 /// Zero of the arm angle, mrad.
-pub const ARM_ZERO: usize = 9;
+pub(crate) const ARM_ZERO: usize = 9;
 /// Elastic creep, logarithm.
-pub const CREEP: usize = 10;
+pub(crate) const CREEP: usize = 10;
 /// Force of the drive over nominal, logarithm.
 pub const DRIVE: usize = 11;
 /// First of the steps: all positions as the wheel's turn has them at its nominal radius,
@@ -109,7 +109,7 @@ impl Coordinates {
     }
 
     /// What is known of each coordinate; their means are where the fit starts.
-    pub fn priors(&self) -> &[Prior] {
+    pub(crate) fn priors(&self) -> &[Prior] {
         &self.priors
     }
 

@@ -83,7 +83,7 @@ impl Run {
     }
 
     /// Simulates the record with the plant of these coordinates.
-    pub fn simulate(&self, of: &Coordinates, x: &[f64]) -> Result<Trajectory, PlantError> {
+    pub(crate) fn simulate(&self, of: &Coordinates, x: &[f64]) -> Result<Trajectory, PlantError> {
         let (traces, plant) = (&self.traces, of.plant(x));
         let (first, last) = (traces.span.start, traces.span.end - 1);
         let dt_s = STEP as f64 * TICK_S;
@@ -210,7 +210,7 @@ const CORNER_MM: f64 = 14.5;
 const PART_OF_CLEAR: f64 = 0.8;
 
 /// Trajectories of all runs at these coordinates.
-pub fn simulate(
+pub(crate) fn simulate(
     runs: &[Run],
     coordinates: &Coordinates,
     x: &[f64],
@@ -219,7 +219,7 @@ pub fn simulate(
 }
 
 /// Derivatives of what a run's sensors would have shown by each coordinate.
-pub fn derivatives(
+pub(crate) fn derivatives(
     run: &Run,
     coordinates: &Coordinates,
     x: &[f64],

@@ -23,7 +23,7 @@ pub const AMPLITUDE_MM: [f64; 3] = [1.7079, 1.5567, 1.9014];
 
 /// Elements around the ring and axial travel per step, mm: gaps within 0.1 % of the
 /// converged ones.
-pub const CONVERGED: (usize, f64) = (2880, 0.01);
+pub(crate) const CONVERGED: (usize, f64) = (2880, 0.01);
 
 /// Change of a logarithm for the differences.
 const MOVED: f64 = 0.02;

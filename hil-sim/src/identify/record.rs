@@ -131,7 +131,7 @@ impl Record {
     }
 
     /// Where the run begins, mm.
-    pub fn start_mm(&self) -> f64 {
+    pub(crate) fn start_mm(&self) -> f64 {
         if self.deploys() { 0.0 } else { self.scenario.rig.rig.travel_mm }
     }
 }

@@ -20,7 +20,7 @@ use super::traces::Zero;
 use crate::scenario::Scenario;
 
 /// Half-width of a 95 % interval in standard deviations.
-pub const NORMAL_95: f64 = 1.96;
+pub(crate) const NORMAL_95: f64 = 1.96;
 /// Part of the prior deviation that the logs must leave for a parameter to count as
 /// identified: where nothing was known, and where a tolerance was.
 const LEAVES: (f64, f64) = (0.1, 0.5);

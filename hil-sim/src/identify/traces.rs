@@ -13,9 +13,9 @@ use super::IdentifyError;
 use super::record::{Record, Sample, TICK_S};
 
 /// Length of a bin, ticks.
-pub const BIN: usize = 10;
+pub(crate) const BIN: usize = 10;
 /// Length of a bin of the drive's effort, ticks: its speed is a difference of counts.
-pub const EFFORT_BIN: usize = 40;
+pub(crate) const EFFORT_BIN: usize = 40;
 /// Half-width of the smoothing windows of rotation and preload, ticks. The model takes the
 /// residual steps of the counts for acceleration, and near the limit of friction creep
 /// grows faster than its mean.

@@ -66,13 +66,13 @@ impl Server {
     }
 
     /// Number of connected clients.
-    pub fn clients(&self) -> usize {
+    pub(crate) fn clients(&self) -> usize {
         lock(&self.clients).len()
     }
 
     /// Sends a message to every client that has subscribed to its topic. A slow client loses
     /// messages and does not delay the others.
-    pub fn publish(&self, topic: Topic, time_ns: u64, body: Vec<u8>) {
+    pub(crate) fn publish(&self, topic: Topic, time_ns: u64, body: Vec<u8>) {
         let message = Arc::new(Published { topic, time_ns, body });
         lock(&self.clients).retain(|client| {
             !matches!(client.try_send(Arc::clone(&message)), Err(TrySendError::Disconnected(_)))

@@ -61,7 +61,7 @@ impl<W: Wire> Client<W> {
     }
 
     /// The line, to listen to it.
-    pub const fn wire_mut(&mut self) -> &mut W {
+    pub(crate) const fn wire_mut(&mut self) -> &mut W {
         &mut self.wire
     }
 
@@ -98,7 +98,7 @@ impl<W: Wire> Client<W> {
     }
 
     /// The board's description of its parameters.
-    pub fn describe(&mut self) -> Result<Description, StoreError> {
+    pub(crate) fn describe(&mut self) -> Result<Description, StoreError> {
         match self.ask(Request::Describe)? {
             Response::Description(description) => Ok(description),
             _ => Err(StoreError::Answer),

@@ -40,7 +40,7 @@ impl<'a> ReconnectingPort<'a> {
     }
 
     /// Events of the port since the last call, a line each.
-    pub fn take_news(&mut self) -> Vec<String> {
+    pub(crate) fn take_news(&mut self) -> Vec<String> {
         std::mem::take(&mut self.news)
     }
 

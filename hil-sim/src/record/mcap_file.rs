@@ -90,7 +90,7 @@ pub enum Topic {
 
 impl Topic {
     /// The topics of a log that grows.
-    pub const LIVE: [Self; 3] = [Self::Tick, Self::Log, Self::Ledger];
+    pub(crate) const LIVE: [Self; 3] = [Self::Tick, Self::Log, Self::Ledger];
 
     pub const fn name(self) -> &'static str {
         match self {

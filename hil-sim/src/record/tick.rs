@@ -39,7 +39,7 @@ pub const MODE_NAMES: [&str; 14] = [
 /// The number of the mode in which the preload builds before the motion.
 pub(crate) const PRELOADS: u8 = 4;
 /// Those in which the drive moves, and of these those at a step.
-pub const MOVES: std::ops::Range<u8> = 5..10;
+pub(crate) const MOVES: std::ops::Range<u8> = 5..10;
 pub(crate) const CROSSES: std::ops::Range<u8> = 7..9;
 const FAULT_HOLD: u8 = 11;
 /// The number of a tick in which the controller did not run.

@@ -59,7 +59,7 @@ impl View {
     }
 
     /// Rig, rates and losses as one line.
-    pub fn rates_text(&self, counts: &Counts) -> String {
+    pub(crate) fn rates_text(&self, counts: &Counts) -> String {
         let (ticks, bytes) = self.rates;
         format!(
             "rig {}  {} ticks, {ticks:.0}/s, {:.0} kB/s  lost {} frames, {} ticks  restarts {}",
@@ -74,7 +74,7 @@ impl View {
 
     /// Time, mode, contact and the quantities of the latest tick, in lines of at most 80 letters;
     /// empty before the first.
-    pub fn state_text(&self) -> String {
+    pub(crate) fn state_text(&self) -> String {
         self.row.map_or_else(String::new, |row| {
             let mode = row.mode().map_or_else(|| "unknown mode".to_owned(), mode_words);
             let stage = stage_name(row.stage);

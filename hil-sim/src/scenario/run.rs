@@ -38,7 +38,7 @@ pub enum Direction {
 
 impl Direction {
     /// Names as written in scenarios and summaries.
-    pub const NAMES: [&str; 2] = ["deploy", "retract"];
+    pub(crate) const NAMES: [&str; 2] = ["deploy", "retract"];
 
     pub const fn name(self) -> &'static str {
         Self::NAMES[self as usize]
@@ -71,7 +71,7 @@ pub enum ControllerKind {
 
 impl ControllerKind {
     /// Names as written in scenarios and summaries.
-    pub const NAMES: [&str; 4] = ["scheduled", "constant", "limit", "reactive"];
+    pub(crate) const NAMES: [&str; 4] = ["scheduled", "constant", "limit", "reactive"];
 
     pub const fn name(self) -> &'static str {
         Self::NAMES[self as usize]
@@ -94,7 +94,7 @@ pub enum MismatchDraw {
 
 impl MismatchDraw {
     /// Names as written in scenarios.
-    pub const NAMES: [&str; 3] = ["stated", "wide", "adversarial"];
+    pub(crate) const NAMES: [&str; 3] = ["stated", "wide", "adversarial"];
 }
 
 /// One step that is not where the step table says. Steps count from 1 on

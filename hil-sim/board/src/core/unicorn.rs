@@ -130,7 +130,6 @@ fn forget_condition<B: Bus>(uc: &mut Hooked<'_, B>) -> Result<(), uc_error> {
 
 impl UnicornCore {
     /// A core with these memories and nothing else, counting the cycles of `counted`.
-    /// Errors: [`CoreError::Engine`] if the engine cannot be had or a memory overlaps.
     pub fn new(memories: &[Memory], counted: &Counted<'_>) -> Result<Self, CoreError> {
         Self::with_bus(memories, counted, NoBus)
     }
@@ -138,7 +137,6 @@ impl UnicornCore {
 
 impl<B: Bus + 'static> UnicornCore<B> {
     /// A core with these memories and a bus, counting the cycles of `counted`.
-    /// Errors: as [`UnicornCore::new`].
     pub fn with_bus(memories: &[Memory], counted: &Counted<'_>, bus: B) -> Result<Self, CoreError> {
         let ranges = bus.ranges();
         let inside =
@@ -182,7 +180,6 @@ impl<B: Bus + 'static> UnicornCore<B> {
 
     /// Sets the places, address and bytes, that the program may not access; everything else in
     /// RAM it may. The host's accesses are not affected.
-    /// Errors: [`CoreError::Engine`] if a place is no whole number of pages of a memory.
     pub fn set_guards(&mut self, guards: Vec<(u32, u32)>) -> Result<(), CoreError> {
         for (base, size) in std::mem::replace(&mut self.guards, guards) {
             let freed = self.engine.mem_protect(base.into(), size.into(), Prot::ALL);
@@ -203,7 +200,6 @@ impl<B: Bus + 'static> UnicornCore<B> {
 
     /// Sets the places of flash, address and bytes, whose reads the bus is told of. Slow while
     /// there are some: the engine calls a hook at every read.
-    /// Errors: [`CoreError::Engine`] if the engine refuses.
     pub fn set_spoilt(&mut self, spoilt: Vec<(u32, u32)>) -> Result<(), CoreError> {
         if self.engine.get_data().spoilt == spoilt {
             return Ok(());
@@ -229,7 +225,6 @@ impl<B: Bus + 'static> UnicornCore<B> {
 
     /// Counts what the flash's wait states cost from now on, see [`crate::accelerator`]. Slow: the
     /// engine calls a hook at every read.
-    /// Errors: [`CoreError::Engine`] if the engine refuses.
     pub fn count_waits(&mut self, flash: Memory) -> Result<(), CoreError> {
         self.engine.get_data_mut().count.count_waits();
         let (first, last) = (flash.base.into(), (flash.base + (flash.size - 1)).into());

@@ -209,7 +209,7 @@ pub fn entry(target: Target, kind: Kind) -> Option<&'static Entry> {
 
 impl Target {
     /// Whether it is hardware of the board, which a run in software lacks.
-    pub fn is_hardware(self) -> bool {
+    pub(crate) fn is_hardware(self) -> bool {
         HARDWARE.iter().any(|entry| entry.target == self)
     }
 }

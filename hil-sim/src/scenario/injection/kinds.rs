@@ -170,13 +170,13 @@ impl Target {
     }
 
     /// Whether it is one of the four sensors or the readback of a bridge.
-    pub const fn is_sensor(self) -> bool {
+    pub(crate) const fn is_sensor(self) -> bool {
         use Target::{Angle, CompressionSensor, Encoder, PreloadSensor};
         self.is_readback() || matches!(self, Encoder | PreloadSensor | CompressionSensor | Angle)
     }
 
     /// Whether it is the readback of a bridge or of both.
-    pub const fn is_readback(self) -> bool {
+    pub(crate) const fn is_readback(self) -> bool {
         matches!(self, Self::Readback | Self::DriveReadback | Self::PretightenerReadback)
     }
 
@@ -210,7 +210,7 @@ impl Target {
 impl Kind {
     /// Whether a fault of an actuator lies in its bridge or before it, so that the bridge
     /// puts out another duty than it was given. The others lie behind: in motor and gear.
-    pub const fn is_in_bridge(self) -> bool {
+    pub(crate) const fn is_in_bridge(self) -> bool {
         use Kind::{Delayed, Off, Regulating, Reversed, Runaway, Stuck};
         matches!(self, Off | Stuck | Reversed | Delayed | Runaway | Regulating)
     }
