@@ -34,4 +34,4 @@ write envelope envelope --out target/figures
 write faults-sil faults -n 100
 write faults-board faults --target board -n 1
 case " $wanted " in *" paper "* | "  ") cargo rig paper > /dev/null ;; esac
-case " $wanted " in *" bench "* | "  ") cargo rig bench --peers --docs > /dev/null ;; esac
+case " $wanted " in *" bench "* | "  ") cargo rig bench --docs > /dev/null ;; esac

@@ -49,6 +49,7 @@
 //! # Ok::<(), interstage::rig::RigError>(())
 //! ```
 
+#![warn(missing_docs)]
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]
 // The board's futures run on executors of one core; none has to be `Send`.

@@ -63,7 +63,6 @@ impl Stage {
         [Self::Board, Self::Sensors, Self::Stop, Self::Drive, Self::Pretightener];
 
     /// In words.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::Board => "board",
@@ -78,9 +77,7 @@ impl Stage {
 /// What there is to know of a check.
 #[derive(Clone, Copy, Debug)]
 pub struct CheckInfo {
-    /// Its name.
     pub name: &'static str,
-    /// Its stage.
     pub stage: Stage,
     /// What is done.
     pub does: &'static str,
@@ -189,17 +186,13 @@ pub(crate) struct Session<'a, 'p> {
 }
 
 /// What a power-up proposes: key, value on the board, value measured.
-#[must_use]
-pub fn proposals(progress: &Progress) -> Vec<(String, String, String)> {
+pub(crate) fn proposals(progress: &Progress) -> Vec<(String, String, String)> {
     let (was, is) = (progress.expected.keys(), progress.proposed.keys());
     let differ = was.into_iter().zip(is).filter(|(was, is)| was.value != is.value);
     differ.map(|(was, is)| (was.key.clone(), was.value.to_string(), is.value.to_string())).collect()
 }
 
 /// Runs the stages that `progress` lacks; `keep` is called after each.
-///
-/// # Errors
-/// [`BringupError`] if it was broken off. A check that fails is a result.
 pub fn run(
     line: &mut Line<'_>,
     operator: &mut dyn Operator,

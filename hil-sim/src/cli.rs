@@ -119,7 +119,6 @@ impl Verb {
 }
 
 /// Runs the command with the arguments of this process.
-#[must_use]
 pub fn main() -> ExitCode {
     let arguments: Vec<OsString> = std::env::args_os().skip(1).collect();
     if let Some(verb) = helped_elsewhere(&arguments) {

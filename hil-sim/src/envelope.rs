@@ -38,7 +38,6 @@ pub struct Cell {
 
 impl Cell {
     /// Whether it completed without slip.
-    #[must_use]
     pub fn good(&self) -> bool {
         self.completed && self.slip_mm.is_some_and(|slip_mm| slip_mm <= SLIP_SEEN_MM)
     }
@@ -58,7 +57,6 @@ pub struct Area {
     pub unknown: f64,
 }
 
-/// The envelope.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Envelope {
     /// Frictions, ascending.
@@ -73,7 +71,6 @@ pub struct Envelope {
 
 impl Envelope {
     /// Part of the grid in which this strategy completes without slip.
-    #[must_use]
     pub fn area(&self, controller: &str) -> Area {
         let part = |known: bool| {
             let of = |cell: &&Cell| cell.controller == controller && cell.known == known;
@@ -86,7 +83,6 @@ impl Envelope {
 
     /// The cells in which another strategy completes without slip and the scheduled one does
     /// not; none if its region contains those of the others.
-    #[must_use]
     pub fn not_contained(&self) -> Vec<&Cell> {
         let scheduled = |cell: &Cell| cell.controller == ControllerKind::Scheduled.name();
         let lacks = |cell: &&Cell| {
@@ -97,8 +93,7 @@ impl Envelope {
 
     /// Mean of this strategy's time over the scheduled one's, in the cells where both complete
     /// without slip; none without such a cell.
-    #[must_use]
-    pub fn time_ratio(&self, controller: &str, known: bool) -> Option<f64> {
+    pub(crate) fn time_ratio(&self, controller: &str, known: bool) -> Option<f64> {
         let good = || self.cells.iter().filter(move |cell| cell.known == known && cell.good());
         let of = |cell: &Cell, name: &str| cell.controller == name;
         let ratios: Vec<f64> = good()
@@ -115,10 +110,6 @@ impl Envelope {
 
 /// Runs every strategy at every place of the grid, on the plant of the scenario's seed with
 /// that friction and load; `progress` is called after every run.
-///
-/// # Errors
-/// [`RunError`] if the scenario itself makes no controller or its plant is refused. A place
-/// whose parameters make none, or whose plant fails, is a cell that did not complete.
 pub fn envelope(
     scenario: &Scenario,
     grid: Grid,

@@ -72,18 +72,12 @@ pub(crate) fn vacant_for(path: &Path, text: &str) -> PathBuf {
 }
 
 /// Writes `text` to `path`; if that fails, the file stays as it was.
-///
-/// # Errors
-/// [`FileError`] with the reason.
 pub fn write_text(path: &Path, text: &str) -> Result<(), FileError> {
     atomic_write(path, |out| Ok(out.write_all(text.as_bytes())?))
 }
 
 /// Makes `directory` and those above it.
-///
-/// # Errors
-/// [`FileError`] with the reason.
-pub fn make_directory(directory: &Path) -> Result<(), FileError> {
+pub(crate) fn make_directory(directory: &Path) -> Result<(), FileError> {
     let what = "cannot make the directory";
     fs::create_dir_all(directory).map_err(|error| FileError {
         path: directory.to_owned(),

@@ -113,10 +113,7 @@ pub(crate) fn could_not_start(command: &Command, source: io::Error) -> FirmwareE
 }
 
 /// Adds the board's target to the toolchain if it is missing.
-///
-/// # Errors
-/// [`FirmwareError::Target`] with what rustup said.
-pub fn ensure_target() -> Result<(), FirmwareError> {
+pub(crate) fn ensure_target() -> Result<(), FirmwareError> {
     // The folder of libraries decides for toolchains with and without rustup.
     let mut rustc = Command::new(tool("RUSTC", "rustc"));
     rustc.args(["--print", "target-libdir", "--target", TARGET]).current_dir(workspace());
@@ -136,18 +133,12 @@ pub fn ensure_target() -> Result<(), FirmwareError> {
 
 /// Builds the image, adding the target first if it is missing, and returns its path.
 /// Progress and cargo's messages go to standard error.
-///
-/// # Errors
-/// [`FirmwareError`] if the target is not available or the build fails.
 pub fn build(profile: Profile) -> Result<PathBuf, FirmwareError> {
     build_binary(PACKAGE, PACKAGE, profile, &[])
 }
 
 /// Builds a binary for the board as [`build`] does the firmware, with these settings
 /// of cargo (`key=value`) instead of the workspace's.
-///
-/// # Errors
-/// As [`build`].
 pub fn build_binary(
     package: &str,
     binary: &str,
@@ -199,9 +190,6 @@ fn named(messages: &str, binary: &str) -> Option<PathBuf> {
 }
 
 /// Builds the firmware and returns the image.
-///
-/// # Errors
-/// [`FirmwareError`] if it does not build or cannot be read.
 pub fn image(profile: Profile) -> Result<Vec<u8>, FirmwareError> {
     let path = build(profile)?;
     std::fs::read(&path).map_err(|source| FirmwareError::Read { path, source })
@@ -218,9 +206,6 @@ pub struct Image {
 
 impl Image {
     /// Of the image in `elf`.
-    ///
-    /// # Errors
-    /// [`FirmwareError::Image`] if it is no image of the firmware.
     pub fn of(elf: &[u8]) -> Result<Self, FirmwareError> {
         let file = parse(elf)?;
         let section = file.section_by_name(ID);
@@ -231,9 +216,6 @@ impl Image {
     }
 
     /// Whether a board has this image in its flash.
-    ///
-    /// # Errors
-    /// [`PortError`] if its memory cannot be read.
     pub fn is_on(&self, port: &mut dyn Port) -> Result<bool, PortError> {
         let mut there = vec![0; self.id.len()];
         port.memory(self.place, &mut there)?;
@@ -265,9 +247,6 @@ pub struct Footprint {
 
 impl Footprint {
     /// Measures the image in `bytes`.
-    ///
-    /// # Errors
-    /// [`FirmwareError::Image`] if it is not an image of this board.
     pub fn of_elf(bytes: &[u8]) -> Result<Self, FirmwareError> {
         let file = parse(bytes)?;
         let stack = symbol(&file, "_stack_start")?.saturating_sub(symbol(&file, "_stack_end")?);

@@ -35,7 +35,6 @@ const ROUNDING: f64 = 1e-9;
 pub struct Asked {
     /// Axial speed, mm/s.
     pub speed_mm_s: f64,
-    /// Preload, N.
     pub preload_n: f64,
     /// Axial load, N; 0 if the wheel is pushed.
     pub load_n: f64,
@@ -46,7 +45,6 @@ pub struct Asked {
 impl FitRange {
     /// The ranges on this wheel. In units of the wheel the model is the same for all: speeds
     /// over `R / tau`, forces over `k_inf R^2 L`, steps over `R`.
-    #[must_use]
     pub fn of(formula: &Formula) -> Self {
         let published = Formula::new(&interstage::rig::Rig::fe());
         let pace = |formula: &Formula| formula.radius_mm / formula.tau_s;
@@ -64,7 +62,6 @@ impl FitRange {
     }
 
     /// Every quantity of this crossing that is outside, as half a sentence each.
-    #[must_use]
     pub fn outside(&self, step_mm: f64, asked: &Asked) -> Vec<String> {
         let load = (0.0, self.load_n);
         let utilisation = (0.0, self.utilisation);

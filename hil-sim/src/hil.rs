@@ -46,7 +46,6 @@ pub enum HilError {
     Apart {
         /// The board's next tick.
         board: u32,
-        /// This host's.
         host: u32,
     },
     /// The board's timeout for its host has passed.

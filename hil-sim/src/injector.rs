@@ -83,7 +83,6 @@ struct Active {
 
 impl FaultInjector {
     /// The faults of a scenario; none if it has none.
-    #[must_use]
     pub fn of(scenario: &Scenario) -> Option<Self> {
         let injections = &scenario.run.faults;
         let turn_mm = std::f64::consts::TAU * scenario.rig.rig.wheel_radius_mm;
@@ -118,7 +117,6 @@ impl FaultInjector {
     }
 
     /// When the first fault came, s since boot.
-    #[must_use]
     pub fn struck_s(&self) -> Option<f64> {
         self.first(|fault| fault.since_s)
     }
@@ -129,14 +127,12 @@ impl FaultInjector {
 
     /// When a fault first changed the duty of an actuator, s since boot; other faults act as
     /// soon as they come.
-    #[must_use]
     pub fn acts_s(&self) -> Option<f64> {
         self.first(Active::acts_s)
     }
 
     /// The same, where a fault of a bridge counts only from a difference of duty on that the
     /// readback must show.
-    #[must_use]
     pub fn tells_s(&self) -> Option<f64> {
         self.first(|fault| if fault.is_in_bridge() { fault.shows_s } else { fault.acts_s() })
     }
@@ -204,7 +200,6 @@ impl FaultInjector {
     }
 
     /// Whether this control tick is lost.
-    #[must_use]
     pub fn lost(&self) -> bool {
         self.faults.iter().any(|fault| {
             let overrun = fault.injection.kind == Kind::Overrun;
@@ -228,19 +223,16 @@ impl FaultInjector {
     }
 
     /// Whether the model task hangs.
-    #[must_use]
-    pub fn model_hangs(&self) -> bool {
+    pub(crate) fn model_hangs(&self) -> bool {
         self.is(Target::Model, Kind::Hung).is_some()
     }
 
     /// Whether the log is not read.
-    #[must_use]
     pub fn log_gone(&self) -> bool {
         self.is(Target::Log, Kind::Gone).is_some()
     }
 
     /// The bridge duties that the plant gets.
-    #[must_use]
     pub fn drives(&mut self, asked: Drives) -> Drives {
         let (mut drives, t_s) = (asked, self.t_s);
         for fault in &mut self.faults {

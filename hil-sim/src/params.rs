@@ -64,7 +64,6 @@ pub enum StoreError {
 pub struct Held {
     /// Name of the rig.
     pub name: String,
-    /// The rig.
     pub rig: Rig,
     /// Layout of its constants; if it is not [`SCHEMA`], they must be made again.
     pub schema: u16,
@@ -76,9 +75,6 @@ pub struct Held {
 
 impl Held {
     /// From the bytes of a set of any schema.
-    ///
-    /// # Errors
-    /// [`SetError`] if they are no set.
     pub fn of(set: &[u8], origin: String) -> Result<Self, SetError> {
         let set = ParameterSet::open_any(set)?;
         let header = set.header();
@@ -92,8 +88,7 @@ impl Held {
     }
 
     /// Whether its constants are of this program's layout.
-    #[must_use]
-    pub const fn is_current(&self) -> bool {
+    pub(crate) const fn is_current(&self) -> bool {
         self.schema == SCHEMA
     }
 }
@@ -101,28 +96,15 @@ impl Held {
 /// A place that holds parameters.
 pub trait Store {
     /// The active parameters.
-    ///
-    /// # Errors
-    /// [`StoreError`] if it cannot be read.
     fn held(&mut self) -> Result<Held, StoreError>;
 
     /// Makes a set the active one, completely or not at all.
-    ///
-    /// # Errors
-    /// [`StoreError`]; the active set is then unchanged.
     fn put(&mut self, set: &[u8]) -> Result<(), StoreError>;
 
     /// Makes the defaults the active set.
-    ///
-    /// # Errors
-    /// As [`put`](Self::put).
     fn restore(&mut self) -> Result<(), StoreError>;
 }
 
-/// The set of a rig.
-///
-/// # Errors
-/// [`CompileError`] if the rig is not valid.
 pub fn set_of(name: &str, rig: &Rig) -> Result<Vec<u8>, CompileError> {
     Ok(compile(name, rig)?.to_vec())
 }
@@ -135,7 +117,6 @@ pub struct SetFile {
 
 impl SetFile {
     /// This file, which need not exist.
-    #[must_use]
     pub fn new(path: &Path) -> Self {
         Self { path: path.to_owned() }
     }

@@ -31,32 +31,17 @@ pub enum PortError {
 pub trait Port {
     /// Takes the bytes that an RTT channel has sent up; none before the firmware has set its
     /// channels up.
-    ///
-    /// # Errors
-    /// [`PortError`] if the connection is broken, or the image has no such channel.
     fn up(&mut self, channel: u32) -> Result<Vec<u8>, PortError>;
 
     /// Sends bytes down an RTT channel, as many as there is room for; returns how many.
-    ///
-    /// # Errors
-    /// As [`Port::up`].
     fn down(&mut self, channel: u32, bytes: &[u8]) -> Result<usize, PortError>;
 
     /// Resets the board.
-    ///
-    /// # Errors
-    /// As [`Port::up`].
     fn reset(&mut self) -> Result<(), PortError>;
 
     /// Reads memory.
-    ///
-    /// # Errors
-    /// As [`Port::up`].
     fn memory(&mut self, address: u32, into: &mut [u8]) -> Result<(), PortError>;
 
     /// Waits before the next poll of the board; returns how long.
-    ///
-    /// # Errors
-    /// As [`Port::up`].
     fn pass(&mut self) -> Result<Duration, PortError>;
 }

@@ -9,13 +9,11 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 const FRAME: Duration = Duration::from_millis(120);
 
 /// A bar over `length` items of `what`. Dropping it removes it.
-#[must_use]
 pub fn bar(what: &str, length: u64) -> Progress {
     Progress::new(Some(length), "{msg} {wide_bar} {pos}/{len}, {eta} left", what)
 }
 
 /// A spinner for work of unknown length.
-#[must_use]
 pub fn spinner(what: &str) -> Progress {
     let spinner = Progress::new(None, "{spinner} {msg} {elapsed}", what);
     spinner.0.enable_steady_tick(FRAME);
@@ -46,7 +44,6 @@ impl Progress {
     }
 
     /// Items that are done, and all of them.
-    #[must_use]
     pub fn position(&self) -> (u64, u64) {
         (self.0.position(), self.0.length().unwrap_or(0))
     }

@@ -59,9 +59,6 @@ pub enum ProvisionError {
 
 /// Builds this part of `rig` with the tools it needs and returns the binary. A second call
 /// builds nothing and says nothing. Progress and cargo's messages go to standard error.
-///
-/// # Errors
-/// [`ProvisionError`] if tools are not available or the build fails.
 pub fn featured(extra: Extra) -> Result<PathBuf, ProvisionError> {
     let (what, binary, arguments) = extra.build();
     let mut cargo = firmware::build_command(arguments);
@@ -74,18 +71,12 @@ pub fn featured(extra: Extra) -> Result<PathBuf, ProvisionError> {
 
 /// Runs that part of `rig`, built first if need be, with the arguments of this process, and
 /// returns its exit code. Standard output is its own.
-///
-/// # Errors
-/// As [`featured`].
-pub fn go_on(extra: Extra) -> Result<u8, ProvisionError> {
+pub(crate) fn go_on(extra: Extra) -> Result<u8, ProvisionError> {
     go_on_with(extra, env::args_os().skip(1))
 }
 
 /// The same with these arguments.
-///
-/// # Errors
-/// As [`featured`].
-pub fn go_on_with(
+pub(crate) fn go_on_with(
     extra: Extra,
     arguments: impl IntoIterator<Item = OsString>,
 ) -> Result<u8, ProvisionError> {

@@ -29,13 +29,11 @@ pub use ledger::LedgerLine;
 pub use mcap_file::{FRAMES, Topic, messages, unwrapped, write_mcap};
 pub use probed::Probed;
 pub use read::{ReadError, pieces};
-pub(crate) use recorder::RunRecorder;
-pub use recorder::text;
-pub use recording::{complete, recording};
+pub use recorder::{RunRecorder, text};
+pub use recording::recording;
 pub use run::{Boot, Cut, Header, Run, Since, Unknown};
 pub use source::{Bytes, Source, SourceError, Virtual, letter, starter};
 pub use summary::{CrossingLine, LogLine, Recording, Report, Summary};
-pub use tally::{Ended, Tally, true_line};
 pub use tick::{
     Controller, MODE_NAMES, STAGE_NAMES, Tick, TrueState, mode_number, mode_words, stage_name,
 };

@@ -31,7 +31,6 @@ pub struct Replayed {
 
 impl Replayed {
     /// Every tick of the log was run again and gave what was recorded.
-    #[must_use]
     pub const fn is_equal(&self) -> bool {
         self.difference.is_none() && self.blind == 0 && self.ticks > 0
     }
@@ -40,13 +39,11 @@ impl Replayed {
 /// First difference between replay and log.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Difference {
-    /// The tick.
     pub tick: u32,
     /// Its contact stage, as recorded.
     pub contact: &'static str,
     /// The stage of the tick that gave the quantity.
     pub stage: &'static str,
-    /// The quantity.
     pub quantity: &'static str,
     /// Recorded value.
     pub recorded: String,
@@ -68,9 +65,6 @@ impl std::fmt::Display for Difference {
 ///
 /// After a gap in the log the controller's state is not known: ticks from there to the
 /// next start of the target are counted as blind.
-///
-/// # Errors
-/// [`RigError`] if the parameters do not make a controller.
 pub fn replay(run: &Run, rig: &Rig) -> Result<Replayed, RigError> {
     let controller = Controller::try_build(rig)?;
     let mut replay = Replay {

@@ -41,7 +41,6 @@ pub struct Scenario {
     pub noise: Noise,
     /// What the plant has and the controller is not told.
     pub mismatch: Mismatch,
-    /// Options of the run.
     pub run: RunOptions,
 }
 
@@ -63,9 +62,6 @@ const DRAWS: u64 = 64;
 
 impl Scenario {
     /// The scenario of a preset: its rig, with the usual spread and noise.
-    ///
-    /// # Errors
-    /// [`ScenarioError`] if there is none of that name.
     pub fn named(preset: &str) -> Result<Self, ScenarioError> {
         Self::from_preset(preset, COMMAND_LINE)
     }
@@ -75,9 +71,6 @@ impl Scenario {
     /// `preset` is the one asked for on the command line. Without it the file's
     /// `preset` key counts, and without that `prototype`. Each of `sets` is
     /// `key=value` with a dotted key.
-    ///
-    /// # Errors
-    /// The first thing found wrong, with the key and where it was written.
     pub fn resolve(
         preset: Option<&str>,
         file: Option<&Path>,
@@ -88,16 +81,12 @@ impl Scenario {
 
     /// As [`Scenario::resolve`], with the text of the file; `name` is its
     /// path in messages.
-    ///
-    /// # Errors
-    /// The first thing found wrong, with the key and where it was written.
     pub fn parse(name: &str, text: &str, sets: &[String]) -> Result<Self, ScenarioError> {
         Self::layered(None, Some((name.to_owned(), merge::parse(name, text)?)), sets)
     }
 
     /// The scenario of a rig that is near this preset's, with the usual spread and noise.
-    #[must_use]
-    pub fn of_rig(preset: &str, rig: Rig) -> Self {
+    pub(crate) fn of_rig(preset: &str, rig: Rig) -> Self {
         Self {
             preset: preset.to_owned(),
             rig,
@@ -109,22 +98,17 @@ impl Scenario {
     }
 
     /// This scenario with overrides, each `key=value`; then every check.
-    ///
-    /// # Errors
-    /// The first thing found wrong.
     pub fn with(self, sets: &[String]) -> Result<Self, ScenarioError> {
         self.overlaid(None, sets)
     }
 
     /// Every key with its unit, value, what it takes, and its description.
-    #[must_use]
     pub fn keys(&self) -> Vec<KeyInfo> {
         keys::list(&self.table(), &validate::all_ranges(self))
     }
 
     /// The keys whose value is not the preset's, in the order of their sections, without those of
     /// a run's own: direction, controller and seed.
-    #[must_use]
     pub fn overrides(&self) -> serde_json::Map<String, serde_json::Value> {
         const OWN: [&str; 4] = ["preset", "run.direction", "run.controller", "run.seed"];
         let (ours, preset) = (self.table(), Self::named(&self.preset).unwrap_or_default().table());
@@ -137,13 +121,11 @@ impl Scenario {
     }
 
     /// The complete scenario as TOML; reading it back gives the same scenario.
-    #[must_use]
     pub fn to_toml(&self) -> String {
         toml::to_string(self).expect("numbers, words and lists are always TOML")
     }
 
     /// The plant of the scenario's seed.
-    #[must_use]
     pub fn plant(&self) -> PlantParameters {
         self.plant_with(&self.drawn_mismatch())
     }
@@ -159,8 +141,7 @@ impl Scenario {
 
     /// The mismatch of the scenario's seed: as stated, or drawn wide. Seed 0 draws none. What
     /// makes no wheel, such as a tread too thin for its load, is drawn again.
-    #[must_use]
-    pub fn drawn_mismatch(&self) -> Mismatch {
+    pub(crate) fn drawn_mismatch(&self) -> Mismatch {
         let beyond = match self.run.mismatch {
             MismatchDraw::Wide if self.run.seed > 0 => &[],
             MismatchDraw::Adversarial if self.run.seed > 0 => ADVERSARIAL,
@@ -174,15 +155,11 @@ impl Scenario {
 
     /// Steps of the nominal plant, ascending: position, mm, and how much higher than the
     /// step table says each is, mm. The anomalies of the run are applied.
-    #[must_use]
     pub fn true_steps(&self) -> Vec<(f64, f64)> {
         run::apply(&self.rig.rig.step_positions_mm, &self.run.anomalies)
     }
 
     /// Checks every value against its range and the values against one another.
-    ///
-    /// # Errors
-    /// The first thing found wrong.
     pub fn validate(&self) -> Result<(), ScenarioError> {
         validate::check(self, &Provenance::new(&self.preset))
     }
@@ -239,8 +216,7 @@ impl Scenario {
 }
 
 /// A value as short as it can be written: no decimals without need, no blanks, no quotes.
-#[must_use]
-pub fn brief(value: &serde_json::Value) -> String {
+pub(crate) fn brief(value: &serde_json::Value) -> String {
     match value {
         serde_json::Value::Number(number) => {
             number.as_f64().map_or_else(|| number.to_string(), |number| number.to_string())

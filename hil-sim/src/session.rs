@@ -66,18 +66,11 @@ impl From<ControllerKind> for Strategy {
 
 /// Runs a scenario to its end: arrival, fault hold, or time. The operator presses the
 /// button once, as soon as the drive is idle.
-///
-/// # Errors
-/// [`RunError`] if the parameters are out of range or the plant fails. A run that
-/// ends in a fault is a result, not an error.
 pub fn run(scenario: &Scenario, options: Options) -> Result<Recording, RunError> {
     run_session(Session::new(scenario, options)?, scenario)
 }
 
 /// [`run`] of a session that has been made ready for this scenario.
-///
-/// # Errors
-/// [`RunError::Plant`] if the plant fails.
 pub fn run_session(mut session: Session, scenario: &Scenario) -> Result<Recording, RunError> {
     let mut start = Some(starter(scenario.run.direction));
     let started = Instant::now();

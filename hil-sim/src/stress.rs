@@ -49,11 +49,9 @@ pub enum Figure {
 /// A figure of a case, in parts of its limit.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Worst {
-    /// Which figure.
     pub figure: Figure,
     /// Its value over its limit: above 1 it is a failure.
     pub value: f64,
-    /// The case.
     pub case: StressCase,
 }
 
@@ -62,7 +60,6 @@ pub struct Worst {
 pub struct StressFailure {
     /// What happened.
     pub why: String,
-    /// The case.
     pub case: StressCase,
 }
 
@@ -93,7 +90,6 @@ type Ran = (StressCase, Result<Vec<(Figure, f64)>, String>);
 
 /// Runs `count` cases and calls `done` after each; checks that a twentieth as many impossible
 /// ones are refused.
-#[must_use]
 pub fn run(count: usize, seed: u64, done: &(dyn Fn() + Sync)) -> StressReport {
     let run = |case| {
         let figures = one(&case);

@@ -9,12 +9,11 @@ use serde_json::{Map, Value};
 pub use picture::{Plot, picture};
 
 /// Most places of a grid.
-pub const MOST: usize = 10_000;
+pub(crate) const MOST: usize = 10_000;
 
 /// A key with the values that it takes one after the other.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Axis {
-    /// The key.
     pub key: String,
     /// Its values, as `--set` takes them.
     pub values: Vec<String>,
@@ -79,7 +78,6 @@ fn rounded(value: f64) -> String {
 }
 
 /// Every place of the grid, the last key fastest: a value of each axis.
-#[must_use]
 pub fn places<'a>(axes: &'a [Axis]) -> Vec<Vec<&'a str>> {
     let mut places = vec![Vec::new()];
     for axis in axes {
@@ -92,7 +90,6 @@ pub fn places<'a>(axes: &'a [Axis]) -> Vec<Vec<&'a str>> {
 }
 
 /// A row: the values of the keys, then what was found there.
-#[must_use]
 pub fn row(axes: &[Axis], place: &[&str], found: Map<String, Value>) -> Map<String, Value> {
     let value = |text: &str| {
         let number = text.parse::<f64>().ok().and_then(serde_json::Number::from_f64);
@@ -103,9 +100,6 @@ pub fn row(axes: &[Axis], place: &[&str], found: Map<String, Value>) -> Map<Stri
 }
 
 /// The rows as a table of comma-separated values with these columns.
-///
-/// # Errors
-/// [`csv::Error`] only if memory fails.
 pub fn csv(columns: &[String], rows: &[Map<String, Value>]) -> csv::Result<String> {
     let mut table = csv::Writer::from_writer(Vec::new());
     table.write_record(columns)?;

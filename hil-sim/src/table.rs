@@ -8,7 +8,6 @@ pub const WIDTH: u16 = 100;
 
 /// A table of `head` and `rows` in the style of the others, its first column on the
 /// left and the rest on the right.
-#[must_use]
 pub fn plain(head: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> Table {
     let mut table = Table::new();
     table
@@ -32,7 +31,6 @@ fn cell(column: usize, text: String) -> Cell {
 }
 
 /// `value` with `decimals`; a dash if it is missing or no number.
-#[must_use]
 pub fn number(value: impl Into<Option<f64>>, decimals: usize) -> String {
     let value = value.into().filter(|value| value.is_finite());
     value.map_or_else(|| "-".to_owned(), |value| format!("{value:.decimals$}"))

@@ -19,7 +19,6 @@ const LONG: &str = "RIG_LONG";
 const DENY: [&str; 3] = ["--", "-D", "warnings"];
 
 /// Whether tests run their long samples: as `rig test --long` asks them to.
-#[must_use]
 pub fn long() -> bool {
     env::var_os(LONG).is_some()
 }
@@ -27,10 +26,6 @@ pub fn long() -> bool {
 /// Runs every pass and then `cargo test` with `arguments`; returns the exit code of the
 /// first that failed, or 0. Headings, times and cargo's messages go to standard error;
 /// the last lines of standard output are those of the tests.
-///
-/// # Errors
-/// If the toolchain cannot be completed, a program cannot be started or an image does not
-/// build.
 pub fn run(arguments: &[String], long: bool) -> Result<u8> {
     let manifest = firmware::workspace().join("Cargo.toml");
     ensure!(manifest.is_file(), "{}: the workspace is no longer there", manifest.display());

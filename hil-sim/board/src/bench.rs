@@ -69,13 +69,11 @@ pub struct Bench<'a> {
 impl<'a> Bench<'a> {
     /// A board with this image, off, and the plant of a scenario: for deployment with
     /// the wheel unloaded at the stow end, for retraction pressed at the end of travel.
-    /// Errors: [`ImageError`] if the image is none, or lacks its log.
     pub fn new(elf: &[u8], strings: &'a Strings, scenario: &Scenario) -> Result<Self, ImageError> {
         Self::wired(elf, strings, scenario, &[])
     }
 
     /// The same with mistakes in the wiring.
-    /// Errors: as [`Bench::new`].
     pub fn wired(
         elf: &[u8],
         strings: &'a Strings,
@@ -118,7 +116,6 @@ impl<'a> Bench<'a> {
     }
 
     /// Runs one millisecond. Returns inputs and outputs, and the lines of the log.
-    /// Errors: [`BoardError`] if the engine or the plant fails.
     pub fn step(&mut self) -> Result<(Passed, Vec<Line>), BoardError> {
         let end = self.end();
         self.save()?;
@@ -175,14 +172,12 @@ impl<'a> Bench<'a> {
     }
 
     /// Runs to the end of the millisecond or to a breakpoint, whose address is returned.
-    /// Errors: as [`Bench::step`].
     pub fn run_to_break(&mut self) -> Result<Option<u32>, BoardError> {
         let end = self.end();
         Ok(self.machine.run_until(end)?)
     }
 
     /// Executes one instruction.
-    /// Errors: as [`Bench::step`].
     pub fn step_instruction(&mut self) -> Result<(), BoardError> {
         let end = self.end();
         Ok(self.machine.step(end)?)
@@ -194,7 +189,6 @@ impl<'a> Bench<'a> {
     }
 
     /// Closes a millisecond that is over: the plant makes its step.
-    /// Errors: as [`Bench::step`].
     pub fn close(&mut self) -> Result<(Passed, Vec<Line>), BoardError> {
         self.millisecond += 1;
         self.end = self.end() + STEP;
@@ -258,13 +252,11 @@ impl<'a> Bench<'a> {
         self.wiring.connect(self.machine.chip_mut(), now);
     }
 
-    /// The wiring.
     pub const fn wiring(&self) -> &Wiring {
         &self.wiring
     }
 
     /// A hand holds the board in reset for so many milliseconds.
-    /// Errors: as [`Bench::step`].
     pub fn hold_reset(&mut self, milliseconds: u32) -> Result<(), BoardError> {
         for _ in 0..milliseconds {
             self.machine.restart(Cause::Pin)?;
@@ -312,19 +304,16 @@ impl<'a> Bench<'a> {
     }
 
     /// Sends a letter to the board's console; false if it has no room or is not set up yet.
-    /// Errors: [`BoardError`] if the engine fails.
     pub fn send(&mut self, letter: u8) -> Result<bool, BoardError> {
         Ok(self.probe.down(&mut self.machine, 0, &[letter])? == 1)
     }
 
     /// Sends bytes down the binary line; returns how many it had room for.
-    /// Errors: [`BoardError`] if the engine fails.
     pub fn line_send(&mut self, bytes: &[u8]) -> Result<usize, BoardError> {
         Ok(self.probe.down(&mut self.machine, 1, bytes)?)
     }
 
     /// Bytes that the board has sent up its binary line.
-    /// Errors: [`BoardError`] if the engine fails.
     pub fn line_take(&mut self) -> Result<Vec<u8>, BoardError> {
         Ok(self.probe.up(&mut self.machine, 2)?)
     }
@@ -359,7 +348,6 @@ impl<'a> Bench<'a> {
         self.injector.as_ref().map(BoardInjector::times).unwrap_or_default()
     }
 
-    /// The plant.
     pub const fn plant(&self) -> &VirtualRig {
         &self.plant
     }

@@ -52,12 +52,10 @@ const AHEAD: u64 = 2;
 pub struct Firmware<'a> {
     /// The image.
     pub elf: &'a [u8],
-    /// Its strings.
     pub strings: &'a Strings,
 }
 
 /// Runs a campaign on the emulated board, as [`Campaign::run`] does in software.
-/// Errors: [`BoardError`] if a run without a fault cannot be made.
 pub fn run(
     campaign: &Campaign,
     firmware: Firmware<'_>,

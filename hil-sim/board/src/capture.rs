@@ -29,7 +29,6 @@ pub struct Emulated<'a> {
 impl<'a> Emulated<'a> {
     /// A board with this image and the scenario's parameters. Without an operator (`attended`) the drive starts as soon as
     /// it is idle, and the source ends when the drive has arrived.
-    /// Errors: [`SourceError::Other`] if `elf` is no image of the board.
     pub fn new(
         elf: &[u8],
         strings: &'a Strings,

@@ -61,7 +61,6 @@ pub struct Defects {
     pub stop_shorted: bool,
 }
 
-/// The chip.
 pub struct Chip {
     /// The core's own registers.
     pub system: System,
@@ -90,7 +89,6 @@ pub struct Chip {
     /// Debug support: its freeze bits act while a debugger halts the core.
     debug: Registers,
     crc: CrcUnit,
-    /// The angle sensor.
     pub angle: AngleSensor,
     /// The select line was high during the current frame.
     deselected: bool,

@@ -5,7 +5,6 @@ pub mod unicorn;
 /// A core register.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Register {
-    /// R0 to R12.
     R(u8),
     /// Stack pointer in use.
     Sp,
@@ -149,12 +148,10 @@ pub trait Bus {
         Vec::new()
     }
 
-    /// Reads.
     fn read(&mut self, _access: Access) -> u32 {
         0
     }
 
-    /// Writes.
     fn write(&mut self, _access: Access, _value: u32) {}
 
     /// Writes to flash, which is not writable as memory; false is a fault.
@@ -201,45 +198,4 @@ pub fn passes(priority: i16, primask: u32, basepri: u32, faultmask: u32) -> bool
         level = -1;
     }
     priority < level
-}
-
-/// A Cortex-M4 with its memory: registers, running, counting.
-///
-/// The bus answers addresses without memory; an access without an answer is a fault.
-/// Errors: Every method: [`CoreError::Engine`] if the engine refuses, as for an address without
-/// memory.
-pub trait Core {
-    /// Reads memory.
-    fn read(&self, address: u32, into: &mut [u8]) -> Result<(), CoreError>;
-
-    /// Writes memory, flash too.
-    fn write(&mut self, address: u32, bytes: &[u8]) -> Result<(), CoreError>;
-
-    /// A register's value.
-    fn register(&self, register: Register) -> Result<u32, CoreError>;
-
-    /// Sets a register.
-    fn set_register(&mut self, register: Register, value: u32) -> Result<(), CoreError>;
-
-    /// Runs from `address` until something stops the core, `cycles` at most.
-    fn run(&mut self, address: u32, cycles: u64) -> Result<Stop, CoreError>;
-
-    /// The same, or until the program gets to `until`. Slow: the engine translates again.
-    fn run_to(&mut self, address: u32, cycles: u64, until: u32) -> Result<Stop, CoreError>;
-
-    /// Executes the instruction at `address`, or the conditional block that begins there. Slow:
-    /// the engine translates again.
-    fn step(&mut self, address: u32) -> Result<Stop, CoreError>;
-
-    /// Lets time pass in which no instruction is executed.
-    fn pass(&mut self, cycles: u64);
-
-    /// Cycles and instructions so far.
-    fn meter(&self) -> Meter;
-
-    /// Notes from now on when the program gets to this address.
-    fn mark(&mut self, address: u32);
-
-    /// Moves the notes since the last call into `marks`, in their order.
-    fn take_marks(&mut self, marks: &mut Vec<Mark>);
 }

@@ -55,7 +55,6 @@ pub struct Done {
 }
 
 /// Carries out the steps of a script.
-/// Errors: [`ImageError`] at the first call that fails.
 pub fn run(image: &mut Image, steps: &[Step]) -> Result<Vec<Done>, ImageError> {
     let one = |step: &Step| {
         let (values, cost) = match step {
@@ -94,7 +93,6 @@ pub enum CyclesError {
 /// Cycles of the control tick over complete runs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct TickCycles {
-    /// Every tick.
     pub tick: Spread,
     /// Ticks on the continuous wall, no step inside the horizon.
     pub smooth: Spread,
@@ -116,7 +114,6 @@ pub struct Recorded {
 }
 
 /// Runs a scenario in software and records each tick.
-/// Errors: [`RunError`] as for a run in software.
 pub fn record(scenario: &Scenario) -> Result<Vec<Recorded>, RunError> {
     let mut session = Session::new(scenario, Options::default())?;
     let mut start = Some(starter(scenario.run.direction));
@@ -148,7 +145,6 @@ pub struct TickCost {
 
 /// Replays ticks on the image's controller, built from this preset. Every output must equal
 /// the recorded one to the bit.
-/// Errors: [`CyclesError::Differs`] at the first tick whose output differs.
 pub fn replay(
     image: &mut Image,
     preset: Preset,
@@ -178,7 +174,6 @@ pub fn replay(
 }
 
 /// Measures the control tick over a deployment and a retraction of a preset's scenario.
-/// Errors: [`CyclesError`] if it cannot be run, or host and core differ.
 pub fn tick(image: &mut Image, scenario: &Scenario) -> Result<TickCycles, CyclesError> {
     let preset = Preset::named(&scenario.preset).unwrap_or(Preset::Prototype);
     let mut cycles = TickCycles::default();

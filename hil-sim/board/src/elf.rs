@@ -41,7 +41,6 @@ pub struct Loaded {
 
 impl Loaded {
     /// Reads segments and symbols of an image.
-    /// Errors: [`ImageError::Form`] if it is no image of the board.
     pub fn of(elf: &[u8]) -> Result<Self, ImageError> {
         let file = ElfFile32::<Endianness>::parse(elf).map_err(ImageError::form)?;
         let endian = file.endian();
@@ -78,7 +77,6 @@ impl Loaded {
     }
 
     /// Value of a symbol.
-    /// Errors: [`ImageError::Missing`] if the image has none of this name.
     pub fn symbol(&self, name: &str) -> Result<u32, ImageError> {
         self.symbols.get(name).copied().ok_or_else(|| ImageError::Missing(name.to_owned()))
     }

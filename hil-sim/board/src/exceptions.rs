@@ -9,13 +9,10 @@ const COUNT: usize = 16 + 102;
 pub mod number {
     /// Non-maskable interrupt.
     pub const NMI: u8 = 2;
-    /// Hard fault.
     pub const HARD_FAULT: u8 = 3;
     /// Memory management fault.
     pub const MEM_MANAGE: u8 = 4;
-    /// Bus fault.
     pub const BUS_FAULT: u8 = 5;
-    /// Usage fault.
     pub const USAGE_FAULT: u8 = 6;
     /// Supervisor call.
     pub const SV_CALL: u8 = 11;

@@ -12,7 +12,6 @@ use super::peripherals::flash::Wrong;
 use super::peripherals::pwr::{HOLDS, Then};
 use super::peripherals::rcc::Cause;
 
-/// A fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
     /// An analogue input reads this code, in parts of 2^16: preload sensor (0), compression
@@ -64,14 +63,12 @@ pub enum Fault {
 
 impl Fault {
     /// Switches the fault on.
-    /// Errors: [`CoreError`] if the engine fails or there is no memory at the address.
     pub fn strike(self, machine: &mut Machine) -> Result<(), CoreError> {
         self.switch(machine, true)
     }
 
     /// Switches the fault on or off. A single event (a reset, a hang, a flipped bit) is not
     /// undone.
-    /// Errors: as [`Fault::strike`].
     pub fn switch(self, machine: &mut Machine, on: bool) -> Result<(), CoreError> {
         let now = machine.now();
         let chip = machine.chip_mut();
@@ -124,7 +121,6 @@ impl Fault {
 pub struct Timed {
     /// From power-up, s.
     pub at_s: f64,
-    /// The fault.
     pub fault: Fault,
 }
 

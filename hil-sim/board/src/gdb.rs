@@ -34,12 +34,10 @@ pub enum GdbError {
     /// The address cannot be listened at.
     #[error("{address}: {source}")]
     Listen {
-        /// The address.
         address: String,
         /// Why.
         source: io::Error,
     },
-    /// The connection.
     #[error("the debugger's connection failed: {0}")]
     Connection(String),
     /// The board or its plant.
@@ -48,7 +46,6 @@ pub enum GdbError {
 }
 
 /// Listens at `[host]:[port]`; without a host on this machine alone.
-/// Errors: [`GdbError::Listen`] if that cannot be done.
 pub fn listen(address: &str) -> Result<TcpListener, GdbError> {
     let (host, port) = address.rsplit_once(':').unwrap_or((address, ""));
     let host = if host.is_empty() { "127.0.0.1" } else { host };
@@ -60,7 +57,6 @@ pub fn listen(address: &str) -> Result<TcpListener, GdbError> {
 
 /// Waits for a debugger and serves the board with the image in `elf` to it, from the first
 /// instruction on. The drive starts once it is idle. Returns when the debugger disconnects.
-/// Errors: [`GdbError`] if the board or the connection fails.
 pub fn serve(
     listener: &TcpListener,
     elf: &[u8],

@@ -1,7 +1,7 @@
 //! A measurement image on the core: the host calls its functions and counts their cycles.
 
 use super::core::unicorn::{Access, Counted, Memory, UnicornCore};
-use super::core::{Core, CoreError, Meter, Register, Stop};
+use super::core::{CoreError, Meter, Register, Stop};
 use super::elf::{FLASH, Loaded, RAM, named};
 use super::error::ImageError;
 use super::spread::Spread;
@@ -37,7 +37,6 @@ pub struct Image {
 
 impl Image {
     /// Loads the image in `elf` and runs its start-up code.
-    /// Errors: [`ImageError`] if it is no image, or does not start.
     pub fn start(elf: &[u8]) -> Result<Self, ImageError> {
         let loaded = Loaded::of(elf)?;
         let counted = Counted { base: FLASH.base, bytes: &loaded.flash, code: &loaded.code };
@@ -57,14 +56,12 @@ impl Image {
     }
 
     /// Writes words to the mailbox from `address` on.
-    /// Errors: [`ImageError::Core`] if the mailbox is too small.
     pub fn put(&mut self, address: u32, words: &[u32]) -> Result<(), ImageError> {
         let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
         Ok(self.core.write(address, &bytes)?)
     }
 
     /// Reads words from the mailbox.
-    /// Errors: [`ImageError::Core`] if nothing lies there.
     pub fn get<const N: usize>(&self, address: u32) -> Result<[u32; N], ImageError> {
         let mut words = [0; N];
         for (index, word) in words.iter_mut().enumerate() {
@@ -76,7 +73,6 @@ impl Image {
     }
 
     /// Address of a function, for [`Image::call`].
-    /// Errors: [`ImageError::Missing`] if the image has none of this name.
     pub fn function(&self, name: &str) -> Result<u32, ImageError> {
         let found = self.loaded.functions.iter().find(|function| function.name == name);
         found
@@ -85,8 +81,6 @@ impl Image {
     }
 
     /// Calls a function with at most four arguments.
-    /// Errors: [`ImageError::Lost`] if it panics or does not return, [`ImageError::Core`] if it
-    /// faults.
     pub fn call(&mut self, function: u32, arguments: &[u32]) -> Result<Call, ImageError> {
         for (number, value) in arguments.iter().enumerate() {
             self.core.set_register(Register::R(number as u8), *value)?;
@@ -124,7 +118,6 @@ impl Image {
 
     /// Calls a function once for each input, whose words are passed by reference. Returns the
     /// values and the cost of the calls; `worst_input` is the index of an input.
-    /// Errors: as [`Image::call`], and [`ImageError::Missing`].
     pub fn measure<I: AsRef<[u32]>>(
         &mut self,
         function: &str,

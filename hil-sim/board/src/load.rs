@@ -50,7 +50,6 @@ pub struct Cost {
 /// Cycles with the flash's wait states, see [`super::accelerator`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct WithWaits {
-    /// Mean.
     pub mean: f64,
     /// Most.
     pub worst: u64,
@@ -186,7 +185,6 @@ preempts it.</p>\n"
         )
     }
 
-    /// As text.
     pub fn text(&self, missed: &[String]) -> String {
         let pair = |(name, value)| format!("  {name}: {value}\n");
         let pairs: String = self.pairs().into_iter().map(pair).collect();

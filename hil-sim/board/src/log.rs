@@ -32,7 +32,6 @@ pub struct Strings(Table);
 
 impl Strings {
     /// Reads the strings of an image.
-    /// Errors: [`ImageError::Form`] if it has none, or of another version.
     pub fn of(elf: &[u8]) -> Result<Self, ImageError> {
         let table = Table::parse(elf).map_err(|error| ImageError::Form(format!("{error:#}")))?;
         table.map(Self).ok_or_else(|| ImageError::Form("it logs nothing".to_owned()))

@@ -9,7 +9,7 @@ mod tasks;
 
 use super::chip::Chip;
 use super::core::unicorn::{Counted, UnicornCore};
-use super::core::{Access, Bus, Core, CoreError, Mark, Register, Stop};
+use super::core::{Access, Bus, CoreError, Mark, Register, Stop};
 use super::elf::{BELOW, FLASH, Loaded, RAM, named};
 use super::error::ImageError;
 use super::exceptions::number::SV_CALL;
@@ -50,7 +50,6 @@ pub struct Machine {
 
 impl Machine {
     /// A board with the image in `elf`, before its first instruction.
-    /// Errors: [`ImageError`] if it is no image of the board.
     pub fn new(elf: &[u8]) -> Result<Self, ImageError> {
         let loaded = Loaded::of(elf)?;
         let counted = Counted { base: FLASH.base, bytes: &loaded.flash, code: &loaded.code };
@@ -81,7 +80,6 @@ impl Machine {
     }
 
     /// Counts what the flash's wait states cost from now on, see [`crate::accelerator`].
-    /// Errors: [`CoreError::Engine`] if the engine refuses.
     pub fn count_waits(&mut self) -> Result<(), CoreError> {
         self.core.count_waits(FLASH)
     }
@@ -96,7 +94,6 @@ impl Machine {
         Clock { cycles: self.now(), waits: self.waits() }
     }
 
-    /// The chip.
     pub fn chip(&self) -> &Chip {
         self.core.bus()
     }
@@ -137,7 +134,6 @@ impl Machine {
         &self.restarts
     }
 
-    /// The image.
     pub const fn image(&self) -> &Loaded {
         &self.loaded
     }
@@ -148,7 +144,6 @@ impl Machine {
     }
 
     /// Makes the running code hang: it continues at an instruction that branches to itself.
-    /// Errors: [`CoreError::Engine`] if the image has no such instruction, or the engine fails.
     pub fn hang(&mut self) -> Result<(), CoreError> {
         const TO_ITSELF: [u8; 2] = [0xFE, 0xE7];
         let flash = &self.loaded.flash;
@@ -166,7 +161,6 @@ impl Machine {
     }
 
     /// Resets the board; [`Restart::Power`] also clears RAM.
-    /// Errors: [`CoreError::Engine`] if the engine fails.
     pub fn restart(&mut self, cause: Restart) -> Result<(), CoreError> {
         let now = self.now();
         self.restarts.push((now, cause));
@@ -220,7 +214,6 @@ impl Machine {
 
     /// Runs until this cycle, or the first block after it. Returns early at a breakpoint
     /// instruction, with its address.
-    /// Errors: [`CoreError`] if the engine fails. A fault of the program is an exception.
     pub fn run_until(&mut self, cycle: u64) -> Result<Option<u32>, CoreError> {
         while self.now() < cycle {
             if !self.executes(cycle)? {
@@ -272,7 +265,6 @@ impl Machine {
 
     /// Executes one instruction, or takes an exception; asleep it passes time, up to this
     /// cycle at most. Slow: the engine translates the code again.
-    /// Errors: as [`Machine::run_until`].
     pub fn step(&mut self, cycle: u64) -> Result<(), CoreError> {
         while self.now() < cycle {
             let depth = self.chip().system.exceptions.depth();
@@ -288,7 +280,6 @@ impl Machine {
     }
 
     /// Runs until this cycle; a breakpoint instruction is a fault, as without a debugger.
-    /// Errors: as [`Machine::run_until`].
     pub fn run_on(&mut self, cycle: u64) -> Result<(), CoreError> {
         while self.run_until(cycle)?.is_some() {
             self.fault(Cause::Program(super::core::Fault::Undefined), self.pc)?;
@@ -332,7 +323,6 @@ impl Machine {
 
     /// Runs to this address, anywhere in the code, or to the cycle; true if it got to the
     /// address.
-    /// Errors: as [`Machine::run_until`].
     pub fn run_to(&mut self, address: u32, cycle: u64) -> Result<bool, CoreError> {
         while self.now() < cycle {
             if !self.executes(cycle)? {

@@ -22,7 +22,6 @@ pub struct EmulatedBoard {
 
 impl EmulatedBoard {
     /// Switches a board with this image on and waits until it is idle.
-    /// Errors: [`StoreError`] if the file cannot be read or the board does not start.
     pub fn start(elf: &[u8], flash: &Path) -> Result<Self, StoreError> {
         let wire = |error: &dyn std::fmt::Display| StoreError::Wire(error.to_string());
         let strings: &'static Strings =
@@ -54,7 +53,6 @@ impl EmulatedBoard {
     }
 
     /// Keeps the flash for the next time.
-    /// Errors: [`StoreError`] if the file cannot be written.
     pub fn keep(&self) -> Result<(), StoreError> {
         let mut bytes = vec![0; 2 * SLOT_BYTES];
         self.bench

@@ -21,7 +21,6 @@ pub struct EmulatedPort {
 
 impl EmulatedPort {
     /// A board with this image, before its first instruction.
-    /// Errors: [`ImageError`] if the image is none, or has no RTT channels.
     pub fn new(elf: &[u8]) -> Result<Self, ImageError> {
         let machine = Machine::new(elf)?;
         Ok(Self { probe: Probe::of(&machine)?, machine })

@@ -35,7 +35,6 @@ struct Ring {
 
 impl Probe {
     /// Finds the control block of the image.
-    /// Errors: [`ImageError::Missing`] if it has none.
     pub fn of(machine: &Machine) -> Result<Self, ImageError> {
         Ok(Self { block: machine.image().symbol(SYMBOL)? })
     }
@@ -57,13 +56,11 @@ impl Probe {
     }
 
     /// Makes the channels unknown until the program sets them up again.
-    /// Errors: [`CoreError`] if the control block does not lie in memory.
     pub fn forget(self, machine: &mut Machine) -> Result<(), CoreError> {
         machine.poke(self.block, &[0; MARK.len()])
     }
 
     /// Takes the bytes that channel `index` has sent.
-    /// Errors: [`CoreError`] if the ring does not lie in memory.
     pub fn up(self, machine: &mut Machine, index: u32) -> Result<Vec<u8>, CoreError> {
         let Some(ring) = self.ring(machine, index, false)? else { return Ok(Vec::new()) };
         let mut taken = Vec::new();
@@ -82,7 +79,6 @@ impl Probe {
     }
 
     /// Sends bytes down channel `index`; returns how many it had room for.
-    /// Errors: as [`Probe::up`].
     pub fn down(self, machine: &mut Machine, index: u32, bytes: &[u8]) -> Result<usize, CoreError> {
         let Some(ring) = self.ring(machine, index, true)? else { return Ok(0) };
         let mut write = ring.write;

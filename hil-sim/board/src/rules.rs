@@ -59,13 +59,11 @@ const ACCEPTED: [(Rule, &str); 1] = [(
 
 impl Rule {
     /// The reason why the firmware may break it.
-    #[must_use]
     pub fn accepted(self) -> Option<&'static str> {
         ACCEPTED.iter().find(|(rule, _)| *rule == self).map(|(_, reason)| *reason)
     }
 
     /// The rule with its source.
-    #[must_use]
     pub const fn text(self) -> &'static str {
         match self {
             Self::AdcRegulator => "RM0440 21.4.6: converter used within 20 us of its regulator",

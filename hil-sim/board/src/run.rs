@@ -18,7 +18,7 @@ use crate::chip::map::PARAMETER_SETS;
 use hil_sim::faults::sets;
 use hil_sim::firmware::Footprint;
 use hil_sim::params::set_of;
-use hil_sim::record::{self, Recording};
+use hil_sim::record::Recording;
 use hil_sim::scenario::injection::{Injection, Target};
 use hil_sim::scenario::{ControllerKind, Scenario};
 
@@ -40,7 +40,6 @@ pub struct Ran {
 }
 
 /// Checks that the firmware can run a scenario.
-/// Errors: [`BoardError::Controller`] if the scenario wants another controller than the firmware's.
 pub fn check(scenario: &Scenario) -> Result<(), BoardError> {
     if scenario.run.controller != ControllerKind::Scheduled {
         return Err(BoardError::Controller(scenario.run.controller.name().to_owned()));
@@ -80,7 +79,6 @@ pub struct RunOptions {
 
 /// Runs a scenario on the board with the image in `elf`, and keeps `rows` if that is true.
 /// `watch` gets each line of the log with its time, s.
-/// Errors: [`BoardError`] if the run cannot be made. A run that ends in a fault is a result.
 pub fn run(
     elf: &[u8],
     scenario: &Scenario,
@@ -91,7 +89,6 @@ pub fn run(
 }
 
 /// The same with all options.
-/// Errors: as [`run`].
 pub fn run_with(
     elf: &[u8],
     scenario: &Scenario,
@@ -106,7 +103,7 @@ pub fn run_with(
     if options.wait_states {
         bench.machine_mut().count_waits()?;
     }
-    let mut trace = Trace::new(scenario, bench.plant());
+    let mut trace = Trace::new(bench.plant());
     bench.start_when_idle();
     let started = Instant::now();
     let mut after = AFTER;
@@ -119,7 +116,7 @@ pub fn run_with(
             due.fault.strike(bench.machine_mut())?;
         }
         let waited = bench.waits_to_start();
-        let (passed, lines) = bench.step()?;
+        let (_, lines) = bench.step()?;
         for line in &lines {
             watch(bench.time_s(), line);
         }
@@ -128,14 +125,15 @@ pub fn run_with(
         } else {
             gathered.gather(bench.machine_mut());
         }
-        stream.extend(bench.take_frames());
-        trace.add(&passed, &lines, bench.plant().truth(), options.rows);
+        let frames = bench.take_frames();
+        trace.add(&frames, &lines, bench.plant().truth());
+        stream.extend(frames);
         if trace.is_over() {
             after -= 1;
         }
     }
-    let mut recording = trace.finish(scenario, bench.plant(), started.elapsed().as_secs_f64());
-    record::complete(&mut recording, &record::Run::of_stream(&stream));
+    let wall_s = started.elapsed().as_secs_f64();
+    let mut recording = trace.finish(scenario, bench.plant(), options.rows, wall_s);
     recording.stream = stream;
     let machine = bench.into_machine();
     let stack = stack_used(&machine)?;
@@ -144,7 +142,6 @@ pub fn run_with(
 }
 
 /// Bytes of the stack that were used, deepest since power came up.
-/// Errors: [`BoardError`] if the image does not say where its stack is.
 pub fn stack_used(machine: &Machine) -> Result<u32, BoardError> {
     let end = machine.image().symbol("_stack_end")?;
     let start = machine.image().symbol("_stack_start")?;

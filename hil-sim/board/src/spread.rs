@@ -7,7 +7,6 @@ use crate::core::Meter;
 /// What calls of one function took, textbook cycles.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Spread {
-    /// Calls.
     pub calls: u64,
     /// Cycles of all calls.
     pub cycles: u64,

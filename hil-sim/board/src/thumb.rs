@@ -12,7 +12,6 @@ pub enum Kind {
     Accumulate,
     /// Divides register `n` by register `m`.
     Divide {
-        /// With sign.
         signed: bool,
         /// Register of the dividend.
         n: u8,

@@ -20,7 +20,6 @@ const BLOCKED_N: f64 = 1e4;
 
 macro_rules! mistakes {
     ($($(#[$doc:meta])* $name:ident: $text:literal,)*) => {
-        /// A mistake.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         pub enum Mistake {
             $($(#[$doc])* $name,)*
@@ -31,7 +30,6 @@ macro_rules! mistakes {
             pub const ALL: &[Self] = &[$(Self::$name),*];
 
             /// Its name on the command line.
-            #[must_use]
             pub const fn name(self) -> &'static str {
                 match self {
                     $(Self::$name => $text,)*
@@ -46,7 +44,6 @@ mistakes! {
     OneBank: "one-bank",
     /// The angle encoder is not connected.
     AngleOpen: "angle-open",
-    /// Its magnet is missing.
     MagnetMissing: "magnet-missing",
     /// Its magnet is turned over: the codes grow inwards from the right one at the stow end.
     ArmInwards: "arm-inwards",
@@ -60,7 +57,6 @@ mistakes! {
     SensorsExchanged: "sensors-exchanged",
     /// The compression sensor is not connected.
     CompressionOpen: "compression-open",
-    /// It is reversed.
     CompressionReversed: "compression-reversed",
     /// Line A of the wheel encoder is not connected.
     EncoderA: "encoder-a",
@@ -76,7 +72,6 @@ mistakes! {
     BothSwapped: "both-swapped",
     /// The pre-tightener's leads are exchanged.
     PretightenerLeads: "pretightener-leads",
-    /// The motors are exchanged.
     MotorsExchanged: "motors-exchanged",
     /// The inputs of the drive's readback are exchanged.
     ReadbackSwapped: "readback-swapped",
@@ -131,7 +126,6 @@ pub struct Wiring {
 
 impl Wiring {
     /// A rig with these mistakes.
-    #[must_use]
     pub fn with(mistakes: &[Mistake]) -> Self {
         Self { mistakes: mistakes.to_vec(), ..Self::default() }
     }
@@ -154,7 +148,6 @@ impl Wiring {
     }
 
     /// The motors' supply is there.
-    #[must_use]
     pub fn is_supplied(&self) -> bool {
         let cut = self.stop_pressed && !self.has(Mistake::StopSupply);
         !cut && !self.switched_off && !self.has(Mistake::SupplyOff)
@@ -178,7 +171,6 @@ impl Wiring {
     }
 
     /// What the motors get of what the bridges put out.
-    #[must_use]
     pub fn drives(&self, mut drives: Drives) -> Drives {
         if !self.is_supplied() {
             (drives.drive_on, drives.preload_on) = (false, false);
@@ -197,7 +189,6 @@ impl Wiring {
     }
 
     /// What the board gets of what the sensors and bridges give.
-    #[must_use]
     pub fn codes(&self, mut codes: Codes) -> Codes {
         codes.bridges = self.readback(codes.bridges);
         codes.arm_angle = self.arm(codes.arm_angle);

@@ -18,6 +18,5 @@ mod processor;
 mod registers;
 mod resets;
 mod rules;
-mod second;
 mod silicon;
 mod verbs;

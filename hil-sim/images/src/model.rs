@@ -83,11 +83,9 @@ pub fn fixed_inverse(model: &ReducedModel, given: &Given) -> i32 {
 pub struct Point {
     /// Speed and force.
     pub forward: Given,
-    /// Gap there, mm.
     pub gap_mm: f64,
     /// Speed and gap.
     pub inverse: Given,
-    /// Force there, N.
     pub force_n: f64,
 }
 

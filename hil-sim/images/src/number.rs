@@ -17,7 +17,6 @@ pub trait Number:
     /// Square root; not a number below 0.
     fn sqrt(self) -> Self;
 
-    /// As f64.
     fn value(self) -> f64;
 
     /// From the bits of a Q15.16.

@@ -50,7 +50,6 @@ pub struct Taken {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum Preset {
-    /// The 1:1 prototype.
     Prototype = 0,
     /// The study's own loads.
     Fe = 1,
@@ -84,7 +83,6 @@ fn sample<T>(code: &Code, new: impl Fn(u16) -> T) -> Option<Sample<T>> {
 }
 
 impl Given {
-    /// From an input.
     pub fn of(input: &Input) -> Self {
         let frame = input.sensors;
         let position =
@@ -106,7 +104,6 @@ impl Given {
         }
     }
 
-    /// The input, with this plan.
     pub fn input(&self, plan: Option<Plan>) -> Input {
         let [wheel, preload, compression, arm] = &self.codes;
         Input {
@@ -141,7 +138,6 @@ impl Given {
 }
 
 impl Taken {
-    /// From an output.
     pub fn of(output: &Output) -> Self {
         let digest = Digest::of(output);
         let duty = |command: interstage::units::MotorCommand| {

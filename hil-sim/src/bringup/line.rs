@@ -86,9 +86,6 @@ impl<'p> Line<'p> {
     }
 
     /// The parameters on the board.
-    ///
-    /// # Errors
-    /// As [`Client::held`](Store::held).
     pub fn held(&mut self) -> Result<Held, StoreError> {
         self.client.held()
     }
@@ -216,12 +213,10 @@ impl<'p> Line<'p> {
     }
 }
 
-/// A duty, parts of one.
 fn duty(part: f64) -> Duty {
     Duty::from_bits((part * 32_768.0) as i16)
 }
 
-/// A duty of the drive.
 pub(super) fn drive(part: f64) -> ServiceDuties {
     ServiceDuties { drive: duty(part), ..ServiceDuties::REST }
 }

@@ -30,9 +30,7 @@ pub enum Action {
     SwitchOn,
     /// Press the emergency stop and hold it.
     PressStop,
-    /// Release it.
     ReleaseStop,
-    /// Unplug a sensor.
     Unplug(Sensor),
     /// Plug it in again.
     Plug(Sensor),
@@ -68,7 +66,6 @@ pub enum Question {
 
 impl Question {
     /// The answers with the letters that stand for them.
-    #[must_use]
     pub const fn answers(self) -> &'static [(char, Seen)] {
         match self {
             Self::Turned => &[('o', Seen::Outwards), ('i', Seen::Inwards), ('n', Seen::Nothing)],
@@ -99,7 +96,6 @@ pub enum Seen {
     Outwards,
     /// It turned as to retract.
     Inwards,
-    /// Yes.
     Yes,
     /// No, or nothing.
     Nothing,
@@ -110,21 +106,12 @@ pub enum Seen {
 /// The person at the rig.
 pub trait Operator {
     /// Allows a motion.
-    ///
-    /// # Errors
-    /// [`BringupError::Declined`] if it is not allowed.
     fn confirm(&mut self, motion: &str) -> Result<(), BringupError>;
 
     /// Does something at the rig; returns when it is done.
-    ///
-    /// # Errors
-    /// [`BringupError`] if nobody does it.
     fn act(&mut self, action: Action) -> Result<(), BringupError>;
 
     /// Looks at the rig.
-    ///
-    /// # Errors
-    /// [`BringupError`] if nobody answers.
     fn look(&mut self, question: Question) -> Result<Seen, BringupError>;
 }
 

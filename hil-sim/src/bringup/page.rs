@@ -5,7 +5,6 @@ use crate::report::svg::escape;
 use crate::report::{capital, page_of};
 
 /// The page; it needs no other file.
-#[must_use]
 pub fn html(progress: &Progress) -> String {
     let failed = progress.checks().filter(|check| !check.ok).count();
     let (grade, headline) = match (progress.is_complete(), failed) {

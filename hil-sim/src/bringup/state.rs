@@ -28,13 +28,11 @@ pub struct Progress {
 
 impl Progress {
     /// Nothing yet, for a rig.
-    #[must_use]
     pub fn new(expected: Scenario) -> Self {
         Self { proposed: expected.clone(), expected, stages: Vec::new() }
     }
 
     /// The progress that a file has for this rig; none if it is not there, or of another rig.
-    #[must_use]
     pub fn read(path: &Path, expected: &Scenario) -> Option<Self> {
         let text = std::fs::read_to_string(path).ok()?;
         let kept: Kept = serde_json::from_str(&text).ok()?;
@@ -46,9 +44,6 @@ impl Progress {
     }
 
     /// Keeps it in a file.
-    ///
-    /// # Errors
-    /// [`FileError`] if the file cannot be written.
     pub fn write(&self, path: &Path) -> Result<(), FileError> {
         let (expected, proposed) = (self.expected.to_toml(), self.proposed.to_toml());
         let kept = Kept { expected, proposed, stages: self.stages.clone() };
@@ -63,26 +58,21 @@ impl Progress {
     }
 
     /// Whether a stage has passed.
-    #[must_use]
-    pub fn is_done(&self, stage: Stage) -> bool {
+    pub(crate) fn is_done(&self, stage: Stage) -> bool {
         self.stages.iter().any(|(known, checks)| {
             *known == stage && !checks.is_empty() && checks.iter().all(|check| check.ok)
         })
     }
 
     /// Whether every stage has passed.
-    #[must_use]
     pub fn is_complete(&self) -> bool {
         Stage::ALL.iter().all(|stage| self.is_done(*stage))
     }
 
-    /// Every check so far.
     pub fn checks(&self) -> impl Iterator<Item = &Check> {
         self.stages.iter().flat_map(|(_, checks)| checks)
     }
 
-    /// The stages so far.
-    #[must_use]
     pub fn stages(&self) -> &[(Stage, Vec<Check>)] {
         &self.stages
     }

@@ -55,9 +55,6 @@ struct Printed<'a> {
 }
 
 /// Runs the verb.
-///
-/// # Errors
-/// [`Failure`] if it cannot be run as asked.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
     if args.target == "board" {
         return Ok(Outcome::Code(crate::provision::go_on(crate::provision::Extra::Board)?));
@@ -81,15 +78,11 @@ fn on_probe(args: &Args) -> Result<Outcome, Failure> {
 }
 
 /// The person at the terminal.
-#[must_use]
 pub fn person(args: &Args) -> Stdin<io::StdinLock<'static>, io::Stderr> {
     Stdin::new(io::stdin().lock(), io::stderr(), args.yes)
 }
 
 /// Carries it out at this port.
-///
-/// # Errors
-/// [`Failure`] if it is broken off.
 pub fn carry_out(
     args: &Args,
     port: &mut dyn Port,

@@ -97,7 +97,7 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
 }
 
 /// Writes and prints a run.
-pub fn conclude(
+pub(crate) fn conclude(
     args: &Args,
     recording: &Recording,
     directory: Option<&Path>,
@@ -119,7 +119,6 @@ pub fn conclude(
 
 /// The folder of this run: `directory`, unless it holds another run. A folder that was asked for
 /// is taken even then, and standard error says so; else the run gets a number behind its name.
-#[must_use]
 pub fn place(args: &Args, summary: &Summary, directory: &Path) -> PathBuf {
     let ours = identity(serde_json::to_value(summary).ok());
     let there = |folder: &Path| {

@@ -29,7 +29,6 @@ impl Outcome {
         if good { Self::Good } else { Self::Bad }
     }
 
-    /// The exit code.
     pub fn code(self) -> ExitCode {
         match self {
             Self::Good => ExitCode::SUCCESS,
@@ -59,7 +58,6 @@ impl Failure {
         Self::Run(error.to_string())
     }
 
-    /// The exit code.
     pub fn code(&self) -> ExitCode {
         match self {
             Self::Input(_) => ExitCode::from(2),

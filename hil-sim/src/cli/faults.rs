@@ -48,9 +48,6 @@ pub struct Args {
 
 impl Args {
     /// The campaign that is asked for.
-    ///
-    /// # Errors
-    /// [`Failure::Input`] for an invalid scenario or an unknown fault.
     pub fn campaign(&self) -> Result<Campaign, Failure> {
         let board = self.target == "board";
         let all = if board { Case::all_on_board() } else { Case::all() };
@@ -74,9 +71,6 @@ impl Args {
 }
 
 /// Runs the verb.
-///
-/// # Errors
-/// [`Failure`] as for every verb.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
     if let Some(count) = args.clean {
         return clean(args, count);
@@ -93,9 +87,6 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
 }
 
 /// Prints the outcome.
-///
-/// # Errors
-/// [`Failure`] if it cannot be written.
 pub fn ended(args: &Args, outcome: &Matrix) -> Result<Outcome, Failure> {
     output::result(args.json, outcome, || human(outcome))?;
     Ok(Outcome::of(outcome.is_good()))

@@ -10,10 +10,8 @@ use super::failure::Failure;
 /// A result with the files that were written, as `--json` prints both.
 #[derive(Serialize)]
 pub struct WithFiles<'a, T: Serialize> {
-    /// The result.
     #[serde(flatten)]
     pub result: &'a T,
-    /// The files.
     pub files: &'a [PathBuf],
 }
 

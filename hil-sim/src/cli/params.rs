@@ -94,9 +94,6 @@ struct Printed<'a> {
 }
 
 /// Runs the verb.
-///
-/// # Errors
-/// [`Failure`] if it cannot be run as asked.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
     match (&args.file, args.target.as_deref()) {
         (Some(file), _) => act(args, &mut SetFile::new(file)),
@@ -123,9 +120,6 @@ fn on_probe(args: &Args) -> Result<Outcome, Failure> {
 }
 
 /// Carries out the action on the parameters of this place.
-///
-/// # Errors
-/// [`Failure`] of the place or the input.
 pub fn act(args: &Args, store: &mut impl Store) -> Result<Outcome, Failure> {
     let held = match store.held() {
         // A set that is unreadable or damaged can still be replaced.

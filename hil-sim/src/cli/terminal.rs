@@ -13,7 +13,6 @@ use crate::table::{WIDTH, number, plain};
 
 /// The run of `summary` as text, with the paths of `files` at the end. Ends with a
 /// line feed.
-#[must_use]
 pub fn run(summary: &Summary, files: &[PathBuf]) -> String {
     let mut text = painted(&wrapped(&headline(summary), ""), Grade::of(summary), is_coloured());
     for missing in &summary.missing {

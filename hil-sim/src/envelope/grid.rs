@@ -29,19 +29,16 @@ impl Grid {
     pub const USUAL: Self = Self { frictions: 8, loads: 7 };
 
     /// The frictions, ascending.
-    #[must_use]
-    pub fn frictions(self) -> Vec<f64> {
+    pub(crate) fn frictions(self) -> Vec<f64> {
         spread(FRICTION, self.frictions)
     }
 
     /// The loads on the wheel, ascending, N.
-    #[must_use]
-    pub fn loads_n(self) -> Vec<f64> {
+    pub(crate) fn loads_n(self) -> Vec<f64> {
         spread(LOAD_N, self.loads)
     }
 
     /// Runs that it takes: each place known and unknown with every strategy.
-    #[must_use]
     pub const fn runs(self) -> usize {
         2 * self.frictions * self.loads * STRATEGIES.len()
     }

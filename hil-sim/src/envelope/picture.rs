@@ -21,7 +21,6 @@ const LEGEND: i32 = 52 * S;
 const CELL_PX: f64 = 11.0;
 
 /// The picture as SVG.
-#[must_use]
 pub fn picture(envelope: &Envelope) -> String {
     svg::fixed(SIZE, |area| {
         let (head, maps) = area.split_vertically(LEGEND);

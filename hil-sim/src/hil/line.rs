@@ -22,9 +22,6 @@ pub struct HostLine<'a> {
 
 impl<'a> HostLine<'a> {
     /// Resets the board and waits until it is ready for its first tick.
-    ///
-    /// # Errors
-    /// [`HilError`] if the port fails or no board of this protocol answers.
     pub fn begin(port: &'a mut dyn Port) -> Result<Self, HilError> {
         port.reset()?;
         let mut line = Self { port, gatherer: FrameReader::new() };
@@ -36,15 +33,11 @@ impl<'a> HostLine<'a> {
     }
 
     /// Continues with a board that runs already.
-    #[must_use]
     pub const fn begin_at(port: &'a mut dyn Port) -> Self {
         Self { port, gatherer: FrameReader::new() }
     }
 
     /// One tick of the board.
-    ///
-    /// # Errors
-    /// [`HilError`] if the port fails, the board is silent or has gone on alone.
     pub fn tick(&mut self, tick: Tick, given: Given) -> Result<Taken, HilError> {
         let answers = |answer: &ToHost| !matches!(answer, ToHost::Done(done, _) if *done != tick);
         match self.ask(&ToBoard::Tick(tick, given), answers)? {
@@ -56,9 +49,6 @@ impl<'a> HostLine<'a> {
     }
 
     /// Asks for the board's state: its next tick, and whether it has gone on alone.
-    ///
-    /// # Errors
-    /// As [`HostLine::tick`].
     pub fn state(&mut self) -> Result<(Tick, bool), HilError> {
         let hello = ToBoard::Hello { protocol: PROTOCOL };
         match self.ask(&hello, |answer| matches!(answer, ToHost::Next { .. }))? {

@@ -39,9 +39,6 @@ pub struct Asked {
 
 /// Runs a scenario with the controller on the board behind `port`; passes the time, s, to
 /// `watch` now and then.
-///
-/// # Errors
-/// [`HilError`] if the run cannot be made. One that ends in a fault is a result.
 pub fn run(
     port: &mut dyn Port,
     scenario: &Scenario,

@@ -16,13 +16,13 @@ use super::noise::Noise;
 use super::record::{Record, Sample, TICK_S};
 
 /// Dead time, ms.
-pub const DELAY: usize = 0;
+pub(crate) const DELAY: usize = 0;
 /// Logarithm of the lag, s.
-pub const LAG: usize = 1;
+pub(crate) const LAG: usize = 1;
 /// Slew, N/s by the preload sensor.
-pub const SLEW: usize = 2;
+pub(crate) const SLEW: usize = 2;
 /// Spring rate, N/mm by the preload sensor.
-pub const SPRING: usize = 3;
+pub(crate) const SPRING: usize = 3;
 /// First of the seats, N, one a log.
 const SEATS: usize = 4;
 
@@ -40,15 +40,12 @@ const LEAST_N: f64 = 1e-4;
 pub struct Actuator {
     /// Coordinates.
     pub x: Vec<f64>,
-    /// Their covariance.
     pub covariance: DMatrix<f64>,
     /// Residuals, N, by log.
     pub residuals: Vec<Vec<f64>>,
-    /// Their times, s.
     pub times: Vec<Vec<f64>>,
 }
 
-/// One log.
 struct Log<'a> {
     samples: &'a [Sample],
     /// Ticks of the bins and the mean preload that the sensor showed in them, N.
@@ -163,9 +160,6 @@ impl Model for Screw<'_> {
 
 /// Fits the pre-tightener to records whose contact is known, then once more with the noise
 /// that this leaves.
-///
-/// # Errors
-/// [`IdentifyError::NoFit`] if it does not settle.
 pub fn fit(
     records: &[Record],
     runs: &[Run],

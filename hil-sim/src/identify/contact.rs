@@ -38,7 +38,6 @@ const HELD_CREEP_LN: f64 = 1e-5;
 pub struct Contact {
     /// Coordinates.
     pub x: Vec<f64>,
-    /// Their covariance.
     pub covariance: DMatrix<f64>,
     /// Trajectories of the logs there.
     pub trajectories: Vec<Trajectory>,
@@ -123,9 +122,6 @@ impl Model for Weighted<'_> {
 }
 
 /// Fits the coordinates to the runs, then twice more with the noise that this leaves.
-///
-/// # Errors
-/// [`IdentifyError::NoFit`] if it does not settle.
 pub fn fit(runs: &[Run], coordinates: &Coordinates) -> Result<Contact, IdentifyError> {
     let start: Vec<f64> = coordinates.priors().iter().map(|prior| prior.mean).collect();
     // The creep law is held: fitted, it would absorb the model's errors at every climb.

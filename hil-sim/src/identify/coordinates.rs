@@ -10,9 +10,9 @@ use crate::plant::wall::{Step, Wall};
 use crate::scenario::Scenario;
 
 /// Relaxed stiffness, logarithm.
-pub const STIFFNESS: usize = 0;
+pub(crate) const STIFFNESS: usize = 0;
 /// Stiffening, logarithm.
-pub const STIFFENING: usize = 1;
+pub(crate) const STIFFENING: usize = 1;
 /// Relaxation time, logarithm.
 pub const TAU: usize = 2;
 /// Friction, logarithm.
@@ -20,17 +20,17 @@ pub const FRICTION: usize = 3;
 /// Axial load on the wheel, logarithm.
 pub const LOAD: usize = 4;
 /// Friction of the gearbox, N at the tread.
-pub const GEARBOX: usize = 5;
+pub(crate) const GEARBOX: usize = 5;
 /// Wheel radius, mm.
 pub const RADIUS: usize = 6;
 /// Gain of the preload sensor over nominal, logarithm.
-pub const LOAD_GAIN: usize = 7;
+pub(crate) const LOAD_GAIN: usize = 7;
 /// Gain of the compression sensor over nominal, logarithm.
-pub const TREAD_GAIN: usize = 8;
+pub(crate) const TREAD_GAIN: usize = 8;
 /// Zero of the arm angle, mrad.
-pub const ARM_ZERO: usize = 9;
+pub(crate) const ARM_ZERO: usize = 9;
 /// Elastic creep, logarithm.
-pub const CREEP: usize = 10;
+pub(crate) const CREEP: usize = 10;
 /// Force of the drive over nominal, logarithm.
 pub const DRIVE: usize = 11;
 /// First of the steps: all positions as the wheel's turn has them at its nominal radius,
@@ -54,7 +54,6 @@ const EXACT: f64 = 1e-6;
 /// Mean and standard deviation of a coordinate before any log is read.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Prior {
-    /// Mean.
     pub mean: f64,
     /// Standard deviation.
     pub deviation: f64,
@@ -73,7 +72,6 @@ pub struct Coordinates {
 impl Coordinates {
     /// The coordinates of a rig of which only what the scenario states is known; the
     /// tolerances of sensors and wheel are those of its `spread`.
-    #[must_use]
     pub fn of(scenario: &Scenario) -> Self {
         let mut exact = scenario.clone();
         exact.spread = Spread::none();
@@ -111,13 +109,11 @@ impl Coordinates {
     }
 
     /// What is known of each coordinate; their means are where the fit starts.
-    #[must_use]
-    pub fn priors(&self) -> &[Prior] {
+    pub(crate) fn priors(&self) -> &[Prior] {
         &self.priors
     }
 
     /// The same with one coordinate known otherwise, to this deviation.
-    #[must_use]
     pub fn known(&self, index: usize, mean: f64, deviation: f64) -> Self {
         let mut known = self.clone();
         known.priors[index] = Prior { mean, deviation, tolerance: false };
@@ -125,26 +121,22 @@ impl Coordinates {
     }
 
     /// Number of steps.
-    #[must_use]
     pub const fn steps(&self) -> usize {
         self.steps
     }
 
     /// Coordinate of a step's position.
-    #[must_use]
     pub const fn position(&self, step: usize) -> usize {
         STEPS + step
     }
 
     /// Coordinate of a step's height.
-    #[must_use]
     pub const fn height(&self, step: usize) -> usize {
         STEPS + self.steps + step
     }
 
     /// The plant that these numbers describe, for the forward model: its preload comes
     /// from the log, so that it has no spring; its modes are averaged out of the log.
-    #[must_use]
     pub fn plant(&self, x: &[f64]) -> PlantParameters {
         let k_inf = x[STIFFNESS].exp();
         let scale = self.scale(x);
@@ -172,13 +164,11 @@ impl Coordinates {
     }
 
     /// Travel over the travel at the nominal radius.
-    #[must_use]
     pub fn scale(&self, x: &[f64]) -> f64 {
         x[RADIUS] / self.nominal.ring.radius_mm
     }
 
     /// Position of a step, mm, and its variance by this covariance.
-    #[must_use]
     pub fn place(&self, step: usize, x: &[f64], covariance: &DMatrix<f64>) -> (f64, f64) {
         let (index, scale) = (self.position(step), self.scale(x));
         let by_radius = x[index] / self.nominal.ring.radius_mm;
@@ -189,7 +179,6 @@ impl Coordinates {
     }
 
     /// The rig as stated, without mismatch.
-    #[must_use]
     pub const fn nominal(&self) -> &PlantParameters {
         &self.nominal
     }

@@ -48,7 +48,6 @@ pub struct Run {
     nominal: PlantParameters,
     /// The record's traces.
     pub traces: Traces,
-    /// Its name.
     pub name: String,
 }
 
@@ -72,9 +71,6 @@ pub(super) fn quotient(a: &Channels, b: &Channels, over: f64) -> Channels {
 
 impl Run {
     /// Prepares a record.
-    ///
-    /// # Errors
-    /// As of [`Traces::of`].
     pub fn of(record: &Record, coordinates: &Coordinates) -> Result<Self, super::IdentifyError> {
         Ok(Self {
             start_mm: record.start_mm(),
@@ -87,10 +83,7 @@ impl Run {
     }
 
     /// Simulates the record with the plant of these coordinates.
-    ///
-    /// # Errors
-    /// [`PlantError`] where it has no balance.
-    pub fn simulate(&self, of: &Coordinates, x: &[f64]) -> Result<Trajectory, PlantError> {
+    pub(crate) fn simulate(&self, of: &Coordinates, x: &[f64]) -> Result<Trajectory, PlantError> {
         let (traces, plant) = (&self.traces, of.plant(x));
         let (first, last) = (traces.span.start, traces.span.end - 1);
         let dt_s = STEP as f64 * TICK_S;
@@ -111,7 +104,6 @@ impl Run {
     }
 
     /// What the sensors would have shown in the used bins.
-    #[must_use]
     pub fn predicted(&self, of: &Trajectory, x: &[f64]) -> Channels {
         let (plant, radius) = (&self.nominal, x[RADIUS]);
         let compression = |bin: &Bin| {
@@ -134,14 +126,12 @@ impl Run {
     }
 
     /// What the sensors did show there.
-    #[must_use]
     pub fn measured(&self) -> Channels {
         let stall_n = self.nominal.drive.stall_n;
         self.used(|bin| bin.compression_mm, |_, arm| 1e3 * arm, |effort| stall_n * effort.duty)
     }
 
     /// Times of the values of each channel, s.
-    #[must_use]
     pub fn times(&self) -> Channels {
         let mid = |ticks: &Range<usize>| 0.5e-3 * (ticks.start + ticks.end) as f64;
         self.used(|bin| mid(&bin.ticks), |bin, _| mid(&bin.ticks), |effort| mid(&effort.ticks))
@@ -183,7 +173,6 @@ impl Trajectory {
     }
 
     /// Height of the centre above the outermost wall at a tick, mm.
-    #[must_use]
     pub fn height_mm(&self, tick: f64) -> f64 {
         self.at(HEIGHT, tick)
     }
@@ -221,10 +210,7 @@ const CORNER_MM: f64 = 14.5;
 const PART_OF_CLEAR: f64 = 0.8;
 
 /// Trajectories of all runs at these coordinates.
-///
-/// # Errors
-/// [`PlantError`] where one has no balance.
-pub fn simulate(
+pub(crate) fn simulate(
     runs: &[Run],
     coordinates: &Coordinates,
     x: &[f64],
@@ -233,10 +219,7 @@ pub fn simulate(
 }
 
 /// Derivatives of what a run's sensors would have shown by each coordinate.
-///
-/// # Errors
-/// [`PlantError`] where a changed plant has no balance.
-pub fn derivatives(
+pub(crate) fn derivatives(
     run: &Run,
     coordinates: &Coordinates,
     x: &[f64],

@@ -33,7 +33,6 @@ pub struct Fitted<A> {
     pub x: Vec<f64>,
     /// The model there.
     pub at: A,
-    /// Residuals there.
     pub residuals: DVector<f64>,
     /// Derivatives there.
     pub jacobian: DMatrix<f64>,
@@ -73,10 +72,7 @@ impl<M: Model> LeastSquaresProblem<f64, Dyn, Dyn> for Problem<'_, M> {
 
 /// Minimises the sum of squares from `start` on. The minimum is a local one: a coordinate whose
 /// residuals vanish with it, as a time constant's do, is fitted by its logarithm.
-///
-/// # Errors
-/// [`IdentifyError::NoFit`] if it does not converge or the model has no value at a point.
-pub fn minimise<M: Model>(model: &M, start: &[f64]) -> Result<Fitted<M::At>, IdentifyError> {
+pub(crate) fn minimise<M: Model>(model: &M, start: &[f64]) -> Result<Fitted<M::At>, IdentifyError> {
     let problem = Problem { model, x: DVector::from_column_slice(start), at: model.at(start) };
     let solver = LevenbergMarquardt::new()
         .with_ftol(SETTLED)
@@ -105,10 +101,7 @@ pub fn minimise<M: Model>(model: &M, start: &[f64]) -> Result<Fitted<M::At>, Ide
 }
 
 /// Covariance of the coordinates, (J'J)^-1, of residuals in standard deviations.
-///
-/// # Errors
-/// [`IdentifyError::NoFit`] if the residuals do not determine them.
-pub fn covariance(jacobian: &DMatrix<f64>) -> Result<DMatrix<f64>, IdentifyError> {
+pub(crate) fn covariance(jacobian: &DMatrix<f64>) -> Result<DMatrix<f64>, IdentifyError> {
     let normal = jacobian.transpose() * jacobian;
     let inverse = normal.cholesky().map(|root| root.inverse());
     let why = "the logs do not determine the parameters";
@@ -120,10 +113,7 @@ pub fn covariance(jacobian: &DMatrix<f64>) -> Result<DMatrix<f64>, IdentifyError
 /// part P of it that is no data (White 1980, Liang and Zeger 1986). It covers correlated
 /// noise and noise that differs from place to place. `blocks` are ranges of rows; rows
 /// after the last block are no data. `widened` is w, for errors that no scatter shows.
-///
-/// # Errors
-/// [`IdentifyError::NoFit`] if the residuals do not determine the coordinates.
-pub fn robust(
+pub(crate) fn robust(
     jacobian: &DMatrix<f64>,
     residuals: &DVector<f64>,
     blocks: &[Range<usize>],
@@ -147,10 +137,7 @@ pub fn robust(
 /// Adds to a covariance what the coordinate `index` brings that is held in the fit but
 /// known only to `deviation`: `(dx/dc)(dx/dc)' s^2` with `dx/dc = -H^-1 J' j_c` over the
 /// rows of the data (a consider parameter, Schmidt 1966).
-///
-/// # Errors
-/// [`IdentifyError::NoFit`] if the residuals do not determine the coordinates.
-pub fn consider(
+pub(crate) fn consider(
     covariance: &mut DMatrix<f64>,
     jacobian: &DMatrix<f64>,
     data: usize,

@@ -15,7 +15,6 @@ impl Noise {
     /// Of residuals in order of time. The inflation is the integrated autocorrelation
     /// 1 + 2 sum rho_k, summed until it no longer grows faster than a fifth of the lags
     /// summed (Sokal's window), at most a third of the residuals.
-    #[must_use]
     pub fn of(residuals: &[f64]) -> Self {
         let n = residuals.len();
         let square: f64 = residuals.iter().map(|r| r * r).sum();
@@ -34,7 +33,6 @@ impl Noise {
     }
 
     /// Standard deviation of independent residuals with the same variance of the mean.
-    #[must_use]
     pub fn effective(&self) -> f64 {
         self.deviation * self.inflation.sqrt()
     }

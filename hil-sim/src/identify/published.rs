@@ -23,7 +23,7 @@ pub const AMPLITUDE_MM: [f64; 3] = [1.7079, 1.5567, 1.9014];
 
 /// Elements around the ring and axial travel per step, mm: gaps within 0.1 % of the
 /// converged ones.
-pub const CONVERGED: (usize, f64) = (2880, 0.01);
+pub(crate) const CONVERGED: (usize, f64) = (2880, 0.01);
 
 /// Change of a logarithm for the differences.
 const MOVED: f64 = 0.02;
@@ -39,7 +39,6 @@ const HELD_LN: f64 = 1e-6;
 pub struct Tread {
     /// Relaxed stiffness, Pa/m.
     pub k_inf_pa_per_m: f64,
-    /// Stiffening.
     pub stiffening: f64,
     /// Relaxation time, s.
     pub tau_s: f64,
@@ -118,9 +117,6 @@ impl<'a> Gaps<'a> {
 
 /// Fits the tread to the three published gaps by least squares of their relative
 /// deviations, from the scenario's tread on; with `hold`, its stiffening is held.
-///
-/// # Errors
-/// [`IdentifyError::NoFit`] if it does not settle.
 pub fn fit(
     scenario: &Scenario,
     fineness: (usize, f64),
@@ -135,9 +131,6 @@ pub fn fit(
 }
 
 /// The scenario's own tread with the residuals of its gaps.
-///
-/// # Errors
-/// [`IdentifyError::NoFit`] if a crossing has no balance.
 pub fn stated(scenario: &Scenario, fineness: (usize, f64)) -> Result<Tread, IdentifyError> {
     let gaps = Gaps::of(scenario, fineness);
     let at = gaps.at(&gaps.start);

@@ -59,9 +59,6 @@ pub struct Record {
 
 impl Record {
     /// Reads a log; `given` is the rig of a log without parameters.
-    ///
-    /// # Errors
-    /// [`IdentifyError::Log`] if it cannot be read, is no log of a run, or its rig is not known.
     pub fn read(path: &Path, given: Option<&Scenario>) -> Result<Self, IdentifyError> {
         let name = path.display().to_string();
         let bad = |why| IdentifyError::Log(name.clone(), why);
@@ -92,9 +89,6 @@ impl Record {
     }
 
     /// A record of samples with their ticks.
-    ///
-    /// # Errors
-    /// [`IdentifyError::Log`] if ticks run backwards or too many are missing.
     pub fn new(
         name: &str,
         scenario: Scenario,
@@ -132,14 +126,12 @@ impl Record {
     }
 
     /// Whether the wheel goes out, onto the smaller radius.
-    #[must_use]
     pub fn deploys(&self) -> bool {
         self.scenario.run.direction == Direction::Deploy
     }
 
     /// Where the run begins, mm.
-    #[must_use]
-    pub fn start_mm(&self) -> f64 {
+    pub(crate) fn start_mm(&self) -> f64 {
         if self.deploys() { 0.0 } else { self.scenario.rig.rig.travel_mm }
     }
 }
@@ -157,7 +149,6 @@ pub struct Reader {
 
 impl Reader {
     /// For the sensors of this scenario's rig.
-    #[must_use]
     pub fn new(scenario: &Scenario) -> Self {
         let sense = &scenario.rig.sense;
         Self {

@@ -20,7 +20,7 @@ use super::traces::Zero;
 use crate::scenario::Scenario;
 
 /// Half-width of a 95 % interval in standard deviations.
-pub const NORMAL_95: f64 = 1.96;
+pub(crate) const NORMAL_95: f64 = 1.96;
 /// Part of the prior deviation that the logs must leave for a parameter to count as
 /// identified: where nothing was known, and where a tolerance was.
 const LEAVES: (f64, f64) = (0.1, 0.5);
@@ -65,11 +65,8 @@ impl Parameter {
 /// Residuals of a channel of a log.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Residuals {
-    /// The log.
     pub log: String,
-    /// The channel.
     pub channel: &'static str,
-    /// Unit.
     pub unit: &'static str,
     /// Root mean square.
     pub rms: f64,
@@ -105,9 +102,7 @@ impl Residuals {
 /// Everything that was identified.
 #[derive(Clone, Debug, Serialize)]
 pub struct Identification {
-    /// The parameters.
     pub parameters: Vec<Parameter>,
-    /// The residuals.
     pub residuals: Vec<Residuals>,
     /// Values compared less parameters fitted.
     pub degrees_of_freedom: usize,
@@ -119,9 +114,6 @@ pub struct Identification {
 }
 
 /// Identifies the rig of `scenario` from its logs.
-///
-/// # Errors
-/// [`IdentifyError`] if a log cannot be used or the fit does not settle.
 pub fn identify(records: &[Record], scenario: &Scenario) -> Result<Identification, IdentifyError> {
     for record in records {
         let (its, ours) = (&record.scenario.rig, &scenario.rig);
@@ -338,14 +330,11 @@ fn updated(scenario: &Scenario, parameters: &[Parameter]) -> Scenario {
 }
 
 impl Identification {
-    /// A parameter by its name.
-    #[must_use]
     pub fn parameter(&self, name: &str) -> Option<&Parameter> {
         self.parameters.iter().find(|parameter| parameter.name == name)
     }
 
     /// The scenario file: the identified values, with their intervals in a comment above.
-    #[must_use]
     pub fn to_toml(&self) -> String {
         let mut logs: Vec<&str> = self.residuals.iter().map(|left| &*left.log).collect();
         logs.dedup();

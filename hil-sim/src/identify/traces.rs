@@ -13,9 +13,9 @@ use super::IdentifyError;
 use super::record::{Record, Sample, TICK_S};
 
 /// Length of a bin, ticks.
-pub const BIN: usize = 10;
+pub(crate) const BIN: usize = 10;
 /// Length of a bin of the drive's effort, ticks: its speed is a difference of counts.
-pub const EFFORT_BIN: usize = 40;
+pub(crate) const EFFORT_BIN: usize = 40;
 /// Half-width of the smoothing windows of rotation and preload, ticks. The model takes the
 /// residual steps of the counts for acceleration, and near the limit of friction creep
 /// grows faster than its mean.
@@ -57,7 +57,6 @@ pub struct Zero {
 /// Mean of a channel over a bin.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Bin {
-    /// Ticks.
     pub ticks: Range<usize>,
     /// Compression without its zero, mm.
     pub compression_mm: f64,
@@ -74,7 +73,6 @@ pub struct Bin {
 /// What the drive did over a bin.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Effort {
-    /// Ticks.
     pub ticks: Range<usize>,
     /// Mean duty.
     pub duty: f64,
@@ -109,9 +107,6 @@ pub struct Traces {
 
 impl Traces {
     /// Prepares a record.
-    ///
-    /// # Errors
-    /// [`IdentifyError::Log`] if the wheel was never pressed or never driven.
     pub fn of(record: &Record) -> Result<Self, IdentifyError> {
         let bad = |why: &str| IdentifyError::Log(record.name.clone(), why.into());
         let samples = &record.samples;

@@ -25,7 +25,6 @@ const TIME_S: f64 = 1e-6;
 /// Period of an intermittent contact, s.
 const PERIOD_S: f64 = 0.1;
 
-/// A sensor with its fault.
 #[derive(Clone, Debug)]
 pub(super) struct FaultySensor {
     target: Target,
@@ -191,7 +190,6 @@ impl FaultySensor {
         self.put(frame, code);
     }
 
-    /// Puts in a code as it is.
     fn put(&self, frame: &mut SensorFrame, code: u16) {
         match (self.target, &mut frame.bridges) {
             (Target::PreloadSensor, _) => put(&mut frame.preload_sensor, AdcCode::new(code)),

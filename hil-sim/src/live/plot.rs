@@ -40,7 +40,6 @@ enum Look {
 /// A curve: name, colour, look, value.
 type Curve = (&'static str, Color, Look, fn(&Row) -> f64);
 
-/// A plot.
 pub(super) struct Plot {
     /// Quantity and unit.
     title: &'static str,

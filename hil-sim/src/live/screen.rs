@@ -41,9 +41,6 @@ pub struct Known {
 
 impl Known {
     /// The rig that the target is said to have.
-    ///
-    /// # Errors
-    /// [`RigError`] if no controller can be made of it.
     pub fn of(rig: &Rig) -> Result<Self, RigError> {
         let planner = Planner::try_build(rig)?;
         Ok(Self {
@@ -70,7 +67,6 @@ pub struct Screen {
 
 impl Screen {
     /// Before the first item. `places` says where the log goes.
-    #[must_use]
     pub fn new(known: Known, places: String) -> Self {
         Self {
             known,

@@ -45,9 +45,6 @@ pub struct Server {
 
 impl Server {
     /// Listens at `address`.
-    ///
-    /// # Errors
-    /// If the address is not available.
     pub fn bind(address: &str) -> io::Result<Self> {
         let listener = TcpListener::bind(address)?;
         let address = listener.local_addr()?;
@@ -64,20 +61,19 @@ impl Server {
     }
 
     /// Where it listens.
-    #[must_use]
     pub const fn address(&self) -> SocketAddr {
         self.address
     }
 
     /// Number of connected clients.
-    #[must_use]
-    pub fn clients(&self) -> usize {
+    #[cfg(test)]
+    pub(crate) fn clients(&self) -> usize {
         lock(&self.clients).len()
     }
 
     /// Sends a message to every client that has subscribed to its topic. A slow client loses
     /// messages and does not delay the others.
-    pub fn publish(&self, topic: Topic, time_ns: u64, body: Vec<u8>) {
+    pub(crate) fn publish(&self, topic: Topic, time_ns: u64, body: Vec<u8>) {
         let message = Arc::new(Published { topic, time_ns, body });
         lock(&self.clients).retain(|client| {
             !matches!(client.try_send(Arc::clone(&message)), Err(TrySendError::Disconnected(_)))

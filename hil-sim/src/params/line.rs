@@ -17,15 +17,9 @@ const STEP_MS: u32 = 5;
 /// The line to a board: bytes down, bytes up, and its time.
 pub trait Wire {
     /// Sends as many bytes as there is room for; returns how many.
-    ///
-    /// # Errors
-    /// Why the line is broken.
     fn send(&mut self, bytes: &[u8]) -> Result<usize, String>;
 
     /// Waits so many milliseconds and returns the bytes received.
-    ///
-    /// # Errors
-    /// Why the line is broken.
     fn receive(&mut self, milliseconds: u32) -> Result<Vec<u8>, String>;
 }
 
@@ -67,14 +61,11 @@ impl<W: Wire> Client<W> {
     }
 
     /// The line, to listen to it.
-    pub const fn wire_mut(&mut self) -> &mut W {
+    pub(crate) const fn wire_mut(&mut self) -> &mut W {
         &mut self.wire
     }
 
     /// One request, one answer; ignores answers to earlier requests.
-    ///
-    /// # Errors
-    /// [`StoreError`] if the line is broken, the board silent or refusing.
     pub fn ask(&mut self, request: Request) -> Result<Response, StoreError> {
         self.number = self.number.wrapping_add(1);
         let message = ToBoard::Parameters(self.number, request);
@@ -107,10 +98,7 @@ impl<W: Wire> Client<W> {
     }
 
     /// The board's description of its parameters.
-    ///
-    /// # Errors
-    /// As [`ask`](Self::ask).
-    pub fn describe(&mut self) -> Result<Description, StoreError> {
+    pub(crate) fn describe(&mut self) -> Result<Description, StoreError> {
         match self.ask(Request::Describe)? {
             Response::Description(description) => Ok(description),
             _ => Err(StoreError::Answer),
@@ -118,9 +106,6 @@ impl<W: Wire> Client<W> {
     }
 
     /// Restarts the board.
-    ///
-    /// # Errors
-    /// As [`ask`](Self::ask).
     pub fn restart(&mut self) -> Result<(), StoreError> {
         self.done(Request::Restart)
     }

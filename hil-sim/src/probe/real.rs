@@ -12,7 +12,6 @@ use probe_rs::{Core, MemoryInterface, Permissions, Session};
 use super::{Port, PortError};
 use crate::files::with_causes;
 
-/// The chip.
 const CHIP: &str = "STM32G474RETx";
 /// Which probe, if there are several: as for probe-rs' own tools.
 const SELECTOR: &str = "PROBE_RS_PROBE";
@@ -35,10 +34,6 @@ impl RealPort {
     /// Attaches to the board at the only probe, or at the one that `PROBE_RS_PROBE`
     /// names, without disturbing what runs there. The control block of its channels is
     /// at `block`, if that is known.
-    ///
-    /// # Errors
-    /// [`PortError::Absent`] if there is no probe or it is not clear which, or it cannot
-    /// be used; [`PortError::Gone`] if the chip does not answer.
     pub fn attach(block: Option<u32>) -> Result<Self, PortError> {
         let absent = |error: &dyn std::fmt::Display| PortError::Absent(error.to_string());
         let lister = Lister::new();
@@ -61,9 +56,6 @@ impl RealPort {
     }
 
     /// Puts an image into the board's flash and reads it back. Parameters stored there stay.
-    ///
-    /// # Errors
-    /// [`PortError::Board`] with what probe-rs says.
     pub fn flash(&mut self, elf: &Path) -> Result<(), PortError> {
         self.rtt = None;
         let mut options = DownloadOptions::default();
@@ -102,7 +94,6 @@ impl RealPort {
     }
 }
 
-/// The only probe there is.
 fn only(probes: &[DebugProbeInfo]) -> Result<&DebugProbeInfo, PortError> {
     match probes {
         [one] => Ok(one),

@@ -23,9 +23,6 @@ pub struct ReconnectingPort<'a> {
 
 impl<'a> ReconnectingPort<'a> {
     /// Opens the port by `connect`, and again at most every `pause` when it fails.
-    ///
-    /// # Errors
-    /// [`PortError`] if it cannot be opened the first time.
     pub fn open(
         mut connect: impl FnMut() -> Result<Box<dyn Port + 'a>, PortError> + 'a,
         pause: Duration,
@@ -43,7 +40,7 @@ impl<'a> ReconnectingPort<'a> {
     }
 
     /// Events of the port since the last call, a line each.
-    pub fn take_news(&mut self) -> Vec<String> {
+    pub(crate) fn take_news(&mut self) -> Vec<String> {
         std::mem::take(&mut self.news)
     }
 

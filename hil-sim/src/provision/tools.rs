@@ -33,9 +33,6 @@ pub struct Tools {
 
 impl Tools {
     /// The tools, fetched first if they are missing.
-    ///
-    /// # Errors
-    /// [`ProvisionError`] if they cannot be fetched or the C compiler is missing.
     pub fn ready() -> Result<Self, ProvisionError> {
         let place = firmware::target_directory().join(FOLDER);
         let failed = |why: &str| ProvisionError::Tools(place.clone(), why.into());

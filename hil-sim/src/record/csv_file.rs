@@ -41,9 +41,6 @@ pub(super) fn metadata_of(csv: &Path) -> Result<Metadata, String> {
 
 /// Writes the metadata of the table at `csv`, with the plant's columns where it has the truth,
 /// and returns their path.
-///
-/// # Errors
-/// [`FileError`] with the reason.
 pub fn write_metadata(
     csv: &Path,
     metadata: &Metadata,

@@ -24,7 +24,6 @@ pub enum Item {
     Plan(u32, Plan),
     /// A request for a plan that this tick made.
     Request(u32, PlanRequest),
-    /// An event.
     Event(Entry),
     /// A part of a capture.
     CaptureChunk(CaptureChunk),
@@ -97,11 +96,9 @@ impl std::fmt::Display for Mark {
 /// What the decoder has read so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Counts {
-    /// Bytes.
     pub bytes: u64,
     /// Valid frames.
     pub frames: u64,
-    /// Ticks.
     pub ticks: u64,
     /// Frames known to be missing.
     pub lost_frames: u64,
@@ -119,7 +116,6 @@ pub struct Counts {
 
 impl Counts {
     /// Whether there are ticks, and none is known to be missing.
-    #[must_use]
     pub const fn is_complete(&self) -> bool {
         self.ticks > 0 && self.lost_frames == 0 && self.lost_ticks == 0
     }
@@ -143,13 +139,11 @@ pub struct Decoder {
 
 impl Decoder {
     /// A decoder that starts anywhere in a log.
-    #[must_use]
     pub fn new() -> Self {
         Self::default()
     }
 
     /// What has been read so far.
-    #[must_use]
     pub const fn counts(&self) -> &Counts {
         &self.counts
     }

@@ -41,7 +41,6 @@ fn wrapped(frame: &[u8]) -> Vec<u8> {
 }
 
 /// The frame of a message; files of earlier versions have the frame alone.
-#[must_use]
 pub fn unwrapped(message: &[u8]) -> &[u8] {
     let after = message.iter().skip(1).position(|byte| byte & 0x80 == 0).map_or(0, |at| at + 2);
     let frame = message.get(after..).unwrap_or_default();
@@ -91,10 +90,8 @@ pub enum Topic {
 
 impl Topic {
     /// The topics of a log that grows.
-    pub const LIVE: [Self; 3] = [Self::Tick, Self::Log, Self::Ledger];
+    pub(crate) const LIVE: [Self; 3] = [Self::Tick, Self::Log, Self::Ledger];
 
-    /// Its name.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::Tick => "/tick",
@@ -245,9 +242,6 @@ impl<W: Write + Seek> McapFile<W> {
 /// the time of lift-off, one a line on `/log`, one at the end on `/summary`, the controller's
 /// own log frame by frame on [`FRAMES`]; parameters, version and seed as metadata. Times count
 /// from boot.
-///
-/// # Errors
-/// [`FileError`] with the reason.
 pub fn write_mcap(recording: &Recording, path: &Path) -> Result<(), FileError> {
     atomic_write(path, |out| {
         let mut file = McapFile::new(out)?;

@@ -24,7 +24,6 @@ pub struct Probed<'a> {
 
 impl<'a> Probed<'a> {
     /// Over this port.
-    #[must_use]
     pub const fn new(port: ReconnectingPort<'a>) -> Self {
         Self { port, letters: VecDeque::new() }
     }

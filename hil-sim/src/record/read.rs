@@ -31,7 +31,6 @@ pub enum ReadError {
 
 impl ReadError {
     /// What is wrong, without the path.
-    #[must_use]
     pub fn reason(&self) -> String {
         match self {
             Self::File(_, why) => why.to_string(),
@@ -68,9 +67,6 @@ pub fn pieces(stream: &[u8]) -> impl Iterator<Item = &[u8]> {
 impl Run {
     /// Reads a log of any form: MCAP with the controller's frames, CSV of rows with the metadata
     /// beside it, or the bytes of the channel. A file that was cut off is read up to there.
-    ///
-    /// # Errors
-    /// [`ReadError`] if the file cannot be read or holds no tick.
     pub fn read(path: &Path) -> Result<Self, ReadError> {
         let bytes = content(path)?;
         let no_log = |why: String| ReadError::Content(path.display().to_string(), why);

@@ -19,7 +19,7 @@ use crate::scenario::Scenario;
 const REACHED_PART: f64 = 0.035;
 
 /// The record of a run that goes on.
-pub(crate) struct RunRecorder {
+pub struct RunRecorder {
     tally: Tally,
     seen: ControllerView,
 }
@@ -36,13 +36,14 @@ struct ControllerView {
 }
 
 impl RunRecorder {
-    pub(crate) fn new(gap_ref: f64, start_mm: f64) -> Self {
+    /// A run from `start_mm` with this reference gap, mm.
+    pub fn new(gap_ref: f64, start_mm: f64) -> Self {
         Self { tally: Tally::new(gap_ref, start_mm), seen: ControllerView::default() }
     }
 
     /// Takes a tick: the controller's state and events, the plant's `truth` before it, and the
     /// controller's columns if rows are kept.
-    pub(crate) fn take(
+    pub fn take(
         &mut self,
         telemetry: &Telemetry,
         events: &[Entry],
@@ -75,7 +76,8 @@ impl RunRecorder {
 
     /// The record of a run on `target` that took `wall_s` to compute. `arrived` is the
     /// direction of a completed run, as the controller reports it.
-    pub(crate) fn finish(
+    /// The record of a run that took `wall_s` to compute.
+    pub fn finish(
         self,
         target: &'static str,
         scenario: &Scenario,
@@ -150,7 +152,6 @@ pub(super) fn reported(t_s: f64, event: &Event) -> Option<(bool, Report)> {
 }
 
 /// An event as one line of text.
-#[must_use]
 pub fn text(event: &Event) -> String {
     match event {
         Event::Mode(mode) => format!("mode: {}", mode_words(*mode)),

@@ -22,9 +22,6 @@ use super::{Controller, CrossingLine, LedgerLine, LogLine, Recording, Run, Summa
 use crate::scenario::Scenario;
 
 /// Reads the recording of any log.
-///
-/// # Errors
-/// [`ReadError`] if the file cannot be read or is no log.
 pub fn recording(path: &Path) -> Result<Recording, ReadError> {
     let bytes = content(path)?;
     if is_table(&bytes) {
@@ -64,7 +61,6 @@ fn with_truth(bytes: &[u8]) -> Option<Recording> {
 }
 
 /// The recording of a log without truth: what the controller measured.
-#[must_use]
 pub(crate) fn measured(run: &Run) -> Recording {
     let mut summary = summary(run);
     let mut log = Vec::new();
@@ -89,16 +85,6 @@ pub(crate) fn measured(run: &Run) -> Recording {
         .scenario(&[])
         .map_or_else(|_| run.parameters.clone().unwrap_or_default(), |scenario| scenario.to_toml());
     Recording { summary, rows, log, parameters, ..Recording::default() }
-}
-
-/// Completes the rows of a recording, a millisecond each from boot, by those of the
-/// controller's log. A row whose tick is not in the log keeps what it has.
-pub fn complete(recording: &mut Recording, run: &Run) {
-    for row in &run.rows {
-        if let Some(place) = recording.rows.get_mut(row.tick as usize) {
-            place.controller = *row;
-        }
-    }
 }
 
 /// Tick that accepted the command which the first motion of the log follows from: there the
@@ -281,12 +267,6 @@ mod tests {
         // Every quantity of every tick in less than this.
         let mean = truth.stream.len() as f64 / truth.rows.len() as f64;
         assert!(mean < 50.0, "{mean} bytes a tick");
-        let mut bare = truth.clone();
-        for (tick, row) in (0..).zip(&mut bare.rows) {
-            row.controller = Controller::unknown(tick);
-        }
-        complete(&mut bare, &Run::of_stream(&truth.stream));
-        assert_eq!(format!("{:?}", bare.rows), format!("{:?}", truth.rows));
         let page = crate::report::html(&believed, &[]);
         assert!(page.contains("Deployed") && !page.contains("NaN"), "{}", &page[..2000]);
     }

@@ -87,18 +87,14 @@ pub enum Unknown {
 /// Numbers of items before a start of the target.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Boot {
-    /// Events.
     pub events: usize,
-    /// Plans.
     pub plans: usize,
-    /// Requests.
     pub requests: usize,
 }
 
 /// Items from one start of the target to the next.
 #[derive(Clone, Copy, Debug)]
 pub struct Since<'a> {
-    /// Events.
     pub events: &'a [Entry],
     /// Plans with the ticks that received them.
     pub plans: &'a [(u32, Plan)],
@@ -108,7 +104,6 @@ pub struct Since<'a> {
 
 impl Since<'_> {
     /// Why the target started, if the log has it.
-    #[must_use]
     pub fn restart(&self) -> Option<Restart> {
         self.events.iter().find_map(|entry| match entry.event {
             Event::Restart(restart) => Some(restart),
@@ -118,7 +113,6 @@ impl Since<'_> {
 
     /// Duties that the host asked for in the service mode, as of this tick: only a change is an
     /// event.
-    #[must_use]
     pub fn service(&self, tick: u32) -> ServiceDuties {
         let before = self.events.iter().rev().filter(|entry| entry.at <= tick);
         let mut asked = before.filter_map(|entry| match entry.event {
@@ -136,13 +130,11 @@ pub struct Run {
     pub header: Option<Header>,
     /// A row a tick, in the order of the log.
     pub rows: Vec<Controller>,
-    /// Events.
     pub events: Vec<Entry>,
     /// Plans with the ticks that received them.
     pub plans: Vec<(u32, Plan)>,
     /// Requests with the ticks that made them.
     pub requests: Vec<(u32, PlanRequest)>,
-    /// Lines of the ledger.
     pub ledger: Vec<Line>,
     /// Parts of captures.
     pub captures: Vec<CaptureChunk>,
@@ -161,9 +153,6 @@ pub struct Run {
 impl Run {
     /// The scenario that the log was made with: the parameters in it, or the preset that it names
     /// if that has their hash, with these overrides, each `key=value`.
-    ///
-    /// # Errors
-    /// [`Unknown`] if the log does not say.
     pub fn scenario(&self, sets: &[String]) -> Result<Scenario, Unknown> {
         let scenario = match (&self.parameters, &self.header) {
             (Some(toml), _) => Scenario::parse("parameters of the log", toml, sets)?,
@@ -181,7 +170,6 @@ impl Run {
     }
 
     /// What is missing of the log, in sentences; none if nothing is known to be.
-    #[must_use]
     pub fn missing(&self) -> Vec<String> {
         let Counts { lost_frames, lost_ticks, .. } = self.counts;
         let lost = (lost_frames + lost_ticks > 0)
@@ -198,7 +186,6 @@ impl Run {
     }
 
     /// Reads the bytes of the binary channel.
-    #[must_use]
     pub fn of_stream(bytes: &[u8]) -> Self {
         let (mut decoder, mut run) = (Decoder::new(), Self::default());
         decoder.read(bytes, &mut |item| run.add(&item));
@@ -207,7 +194,6 @@ impl Run {
         run
     }
 
-    /// Adds an item.
     pub fn add(&mut self, item: &Item) {
         match item {
             Item::Identity(identity) => self.header = Some(identity.into()),
@@ -227,7 +213,6 @@ impl Run {
     }
 
     /// The items of a start of the target, counted from 0. Each start counts its ticks from 0.
-    #[must_use]
     pub fn since_boot(&self, boot: usize) -> Since<'_> {
         let from = boot.checked_sub(1).and_then(|before| self.boots.get(before));
         let from = from.copied().unwrap_or_default();
@@ -246,7 +231,6 @@ impl Run {
     }
 
     /// Whether nothing is known to be missing.
-    #[must_use]
     pub fn is_complete(&self) -> bool {
         self.marks.is_empty()
     }

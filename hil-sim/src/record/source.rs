@@ -28,15 +28,9 @@ pub enum SourceError {
 /// A source of the binary log.
 pub trait Source {
     /// The bytes since the last call, possibly empty; none at the end.
-    ///
-    /// # Errors
-    /// [`SourceError`] if it broke off.
     fn read(&mut self) -> Result<Option<Vec<u8>>, SourceError>;
 
     /// Sends a letter to the console; a source without a console drops it.
-    ///
-    /// # Errors
-    /// [`SourceError`] if it broke off.
     fn send(&mut self, letter: u8) -> Result<(), SourceError>;
 
     /// Events of the connection since the last call, a line each.
@@ -46,7 +40,6 @@ pub trait Source {
 }
 
 /// Letter of a command on the console.
-#[must_use]
 pub const fn letter(command: Command) -> u8 {
     match command {
         Command::Start => b's',
@@ -56,13 +49,11 @@ pub const fn letter(command: Command) -> u8 {
     }
 }
 
-/// The command of a letter.
 fn command(letter: u8) -> Option<Command> {
     Command::ALL.into_iter().find(|command| self::letter(*command) == letter)
 }
 
 /// The command that begins a run in this direction.
-#[must_use]
 pub const fn starter(direction: Direction) -> Command {
     match direction {
         Direction::Deploy => Command::Start,
@@ -78,7 +69,6 @@ pub struct Bytes {
 
 impl Bytes {
     /// Reads from `input`, which is called `name`.
-    #[must_use]
     pub fn new(name: String, input: Box<dyn Read + Send>) -> Self {
         Self { name, input }
     }
@@ -117,9 +107,6 @@ pub struct Virtual {
 impl Virtual {
     /// A session of this scenario. Unless an operator attends it, it starts by itself and
     /// ends when the drive has arrived.
-    ///
-    /// # Errors
-    /// [`session::RunError`] if the parameters do not make a controller.
     pub fn new(scenario: &Scenario, attended: bool) -> Result<Self, session::RunError> {
         let options = session::Options { rows: true, ..session::Options::default() };
         Ok(Self {

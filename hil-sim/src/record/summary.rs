@@ -150,9 +150,7 @@ pub struct Summary {
 pub struct Recording {
     /// Summary and ledger.
     pub summary: Summary,
-    /// One row a tick.
     pub rows: Vec<Tick>,
-    /// Log lines.
     pub log: Vec<LogLine>,
     /// Parameters used, as TOML.
     pub parameters: String,

@@ -19,17 +19,16 @@ const ARRIVED_WITHIN_MM: f64 = 1.0;
 
 /// The sums of a run as it goes on.
 #[derive(Default)]
-pub struct Tally {
+pub(super) struct Tally {
     /// Digest of the controller's outputs.
-    pub digest: Sha256,
+    pub(super) digest: Sha256,
     /// One row a tick, if they are kept.
-    pub rows: Vec<Tick>,
-    /// Log lines.
-    pub log: Vec<LogLine>,
+    pub(super) rows: Vec<Tick>,
+    pub(super) log: Vec<LogLine>,
     /// Latched faults.
-    pub faults: Vec<Report>,
+    pub(super) faults: Vec<Report>,
     /// Active limits.
-    pub limits: Vec<Report>,
+    pub(super) limits: Vec<Report>,
     gap_ref_mm: f64,
     start_mm: f64,
     commanded: Option<f64>,
@@ -43,42 +42,39 @@ pub struct Tally {
 }
 
 /// The end of a run.
-pub struct Ended<'a> {
+pub(super) struct Ended<'a> {
     /// What ran the controller.
-    pub target: &'static str,
-    /// Its scenario.
-    pub scenario: &'a Scenario,
+    pub(super) target: &'static str,
+    pub(super) scenario: &'a Scenario,
     /// The plant at the end.
-    pub plant: &'a VirtualRig,
+    pub(super) plant: &'a VirtualRig,
     /// Direction of a completed run, as the controller reports it.
-    pub arrived: Option<Direction>,
+    pub(super) arrived: Option<Direction>,
     /// Wall-clock time that it took, s.
-    pub wall_s: f64,
+    pub(super) wall_s: f64,
 }
 
 impl Tally {
     /// A run that begins at `start_mm` and is planned for gaps of `gap_ref_mm`.
-    #[must_use]
-    pub fn new(gap_ref_mm: f64, start_mm: f64) -> Self {
+    pub(super) fn new(gap_ref_mm: f64, start_mm: f64) -> Self {
         Self { gap_ref_mm, start_mm, ..Self::default() }
     }
 
     /// Time at which this tick began, s.
-    #[must_use]
-    pub fn time_s(&self) -> f64 {
+    pub(super) fn time_s(&self) -> f64 {
         f64::from(self.passed) * TICK_S
     }
 
     /// A command was accepted in this tick: from it on the duration counts, unless the drive
     /// already moved.
-    pub fn accept_command(&mut self) {
+    pub(super) fn accept_command(&mut self) {
         if self.run_started.is_none() {
             self.commanded = Some(self.time_s());
         }
     }
 
     /// Ends a tick in the mode of this number.
-    pub fn close_tick(&mut self, mode: u8, truth: &Truth) {
+    pub(super) fn close_tick(&mut self, mode: u8, truth: &Truth) {
         let t_s = self.time_s();
         self.split.add(t_s, mode, truth.position_mm);
         if MOVES.contains(&mode) {
@@ -92,8 +88,11 @@ impl Tally {
     }
 
     /// The record of the run; `line` makes a line of its ledger.
-    #[must_use]
-    pub fn finish(self, ended: &Ended<'_>, line: impl Fn(&Crossing) -> CrossingLine) -> Recording {
+    pub(super) fn finish(
+        self,
+        ended: &Ended<'_>,
+        line: impl Fn(&Crossing) -> CrossingLine,
+    ) -> Recording {
         let Ended { target, scenario, plant, arrived, wall_s } = *ended;
         let truth = plant.truth();
         let steps = plant.parameters().wall.steps().len();
@@ -151,8 +150,7 @@ impl Tally {
 }
 
 /// A ledger line with what the plant knows.
-#[must_use]
-pub fn true_line(crossing: &Crossing) -> CrossingLine {
+pub(super) fn true_line(crossing: &Crossing) -> CrossingLine {
     CrossingLine {
         index: crossing.index as u8,
         speed_mm_s: crossing.speed_mm_s,

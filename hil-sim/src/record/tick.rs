@@ -39,7 +39,7 @@ pub const MODE_NAMES: [&str; 14] = [
 /// The number of the mode in which the preload builds before the motion.
 pub(crate) const PRELOADS: u8 = 4;
 /// Those in which the drive moves, and of these those at a step.
-pub const MOVES: std::ops::Range<u8> = 5..10;
+pub(crate) const MOVES: std::ops::Range<u8> = 5..10;
 pub(crate) const CROSSES: std::ops::Range<u8> = 7..9;
 const FAULT_HOLD: u8 = 11;
 /// The number of a tick in which the controller did not run.
@@ -51,13 +51,11 @@ pub const STAGE_NAMES: [&str; 6] =
     ["initial", "preloaded", "static friction", "sliding", "rolling", "continuous"];
 
 /// Index of a mode into [`MODE_NAMES`].
-#[must_use]
 pub fn mode_number(mode: Mode) -> u8 {
     split(mode).0
 }
 
 /// A mode in words, with its direction and the code of a fault that is held.
-#[must_use]
 pub fn mode_words(mode: Mode) -> String {
     match mode {
         Mode::FaultHold(fault) => format!("{}, {}", mode.words(), fault.code()),
@@ -66,7 +64,6 @@ pub fn mode_words(mode: Mode) -> String {
 }
 
 /// Name of a contact stage's number.
-#[must_use]
 pub fn stage_name(stage: u8) -> &'static str {
     STAGE_NAMES.get(usize::from(stage).wrapping_sub(1)).copied().unwrap_or("unknown stage")
 }
@@ -183,7 +180,6 @@ pub struct Controller {
     pub vibration_mm: f64,
     /// Distance to the next face, mm; none when no face is left.
     pub distance_mm: Option<f64>,
-    /// Duty of the drive, -1 to 1.
     pub drive_duty: f64,
     /// Duty of the pre-tightener, -1 to 1.
     pub pretightener_duty: f64,
@@ -209,7 +205,6 @@ const DUTY: f64 = 32_768.0;
 
 impl Controller {
     /// A tick that did not run, or is not in the log.
-    #[must_use]
     pub fn unknown(tick: u32) -> Self {
         let unknown = f64::NAN;
         let nothing = Self::of(&Record::default(), &SensorFrame::default());
@@ -235,7 +230,6 @@ impl Controller {
     }
 
     /// The columns of a record and of the codes that the tick used.
-    #[must_use]
     pub fn of(record: &Record, sensors: &SensorFrame) -> Self {
         let Record { telemetry: seen, flags, .. } = record;
         let SensorFrame { wheel_encoder, preload_sensor, compression_sensor, arm_angle, bridges } =
@@ -281,7 +275,6 @@ impl Controller {
     }
 
     /// The controller's sensor codes.
-    #[must_use]
     pub fn sensors(&self) -> SensorFrame {
         fn sample<T>(
             code: Option<u16>,
@@ -310,13 +303,11 @@ impl Controller {
     }
 
     /// All other inputs and outputs of the tick.
-    #[must_use]
     pub const fn flags(&self) -> Flags {
         Flags::from_bits(self.flags)
     }
 
     /// The mode; none if the numbers are invalid.
-    #[must_use]
     pub fn mode(&self) -> Option<Mode> {
         let code = match (self.mode, self.retracts) {
             (FAULT_HOLD, _) => self.fault,
@@ -329,7 +320,6 @@ impl Controller {
     }
 
     /// The controller's state in its own numbers; none if one of them is invalid.
-    #[must_use]
     pub fn telemetry(&self) -> Option<Telemetry> {
         let q = |value: f64| (!value.is_nan()).then(|| Q16::from_num(value));
         let duty = |value: f64| Duty::from_bits((value * DUTY).round() as i16);
@@ -412,13 +402,11 @@ impl From<&Truth> for TrueState {
 
 impl Tick {
     /// A true quantity; `NaN` without truth.
-    #[must_use]
     pub fn of_truth(&self, of: impl Fn(&TrueState) -> f64) -> f64 {
         self.truth.as_ref().map_or(f64::NAN, of)
     }
 
     /// Axial position, mm: the true one, or by odometry where there is none.
-    #[must_use]
     pub fn position_mm(&self) -> f64 {
         self.truth.map_or(self.controller.position_mm, |truth| truth.position_true_mm)
     }

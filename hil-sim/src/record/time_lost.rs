@@ -20,8 +20,6 @@ pub struct TimeLost {
 }
 
 impl TimeLost {
-    /// In one sentence.
-    #[must_use]
     pub fn sentence(&self) -> String {
         let Self { preload_s, approach_s, crossing_s, end_s } = self;
         format!(

@@ -54,14 +54,12 @@ impl View {
     }
 
     /// The latest tick.
-    #[must_use]
     pub const fn row(&self) -> Option<&Controller> {
         self.row.as_ref()
     }
 
     /// Rig, rates and losses as one line.
-    #[must_use]
-    pub fn rates_text(&self, counts: &Counts) -> String {
+    pub(crate) fn rates_text(&self, counts: &Counts) -> String {
         let (ticks, bytes) = self.rates;
         format!(
             "rig {}  {} ticks, {ticks:.0}/s, {:.0} kB/s  lost {} frames, {} ticks  restarts {}",
@@ -76,8 +74,7 @@ impl View {
 
     /// Time, mode, contact and the quantities of the latest tick, in lines of at most 80 letters;
     /// empty before the first.
-    #[must_use]
-    pub fn state_text(&self) -> String {
+    pub(crate) fn state_text(&self) -> String {
         self.row.map_or_else(String::new, |row| {
             let mode = row.mode().map_or_else(|| "unknown mode".to_owned(), mode_words);
             let stage = stage_name(row.stage);
@@ -102,7 +99,6 @@ impl View {
     }
 
     /// The state as a few lines.
-    #[must_use]
     pub fn text(&self, counts: &Counts) -> String {
         let mut lines = vec![self.rates_text(counts)];
         lines.extend(self.row.map(|_| self.state_text()));

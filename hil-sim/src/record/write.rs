@@ -42,9 +42,6 @@ fn write_row<W: Write>(csv: &mut csv::Writer<W>, tick: &Tick) -> csv::Result<()>
 }
 
 /// Writes the rows of `recording` to `path`, below the names of the columns.
-///
-/// # Errors
-/// [`FileError`] with the reason.
 pub fn write_csv(recording: &Recording, path: &Path) -> Result<(), FileError> {
     atomic_write(path, |out| {
         let mut csv = csv::Writer::from_writer(out);
@@ -58,9 +55,6 @@ pub fn write_csv(recording: &Recording, path: &Path) -> Result<(), FileError> {
 /// Writes `log.csv` with its metadata, `log.mcap` and `summary.json`, the object that
 /// `rig deploy --json` prints, into `directory`, which is made if it is missing, and returns
 /// their paths.
-///
-/// # Errors
-/// The first file that cannot be written; those before it stay.
 pub fn write_all(recording: &Recording, directory: &Path) -> Result<Vec<PathBuf>, FileError> {
     make_directory(directory)?;
     let [csv, mcap, summary] =
@@ -99,9 +93,6 @@ pub struct Writer<M: Write + Seek, C: Write> {
 impl<M: Write + Seek, C: Write> Writer<M, C> {
     /// Begins the files. `parameters` are the controller's as TOML, if known; `decoded` adds
     /// ticks to the MCAP file beside the frames.
-    ///
-    /// # Errors
-    /// [`WriteError`] with the reason.
     pub fn new(
         mcap: Option<M>,
         csv: Option<C>,
@@ -128,9 +119,6 @@ impl<M: Write + Seek, C: Write> Writer<M, C> {
     }
 
     /// Adds the controller's parameters, as TOML, to the MCAP file.
-    ///
-    /// # Errors
-    /// [`WriteError`] if it cannot grow any more.
     pub fn parameters(&mut self, toml: &str) -> Result<(), WriteError> {
         let written = self.mcap.as_mut().map_or(Ok(()), |mcap| mcap.parameters(toml));
         written.map_err(|source| self.failed(source))
@@ -147,9 +135,6 @@ impl<M: Write + Seek, C: Write> Writer<M, C> {
     }
 
     /// Takes bytes in pieces of any size; passes each item to `see`.
-    ///
-    /// # Errors
-    /// [`WriteError`] if a file cannot grow any more.
     pub fn take(&mut self, bytes: &[u8], see: &mut impl FnMut(&Item)) -> Result<(), WriteError> {
         self.try_take(bytes, see).map_err(|source| self.failed(source))
     }
@@ -238,9 +223,6 @@ impl<M: Write + Seek, C: Write> Writer<M, C> {
     }
 
     /// Closes the files; returns the counts.
-    ///
-    /// # Errors
-    /// [`WriteError`] if a file cannot be closed.
     pub fn finish(mut self, see: &mut impl FnMut(&Item)) -> Result<Counts, WriteError> {
         let mut items = Vec::new();
         self.decoder.finish(&mut |item| items.push(item));

@@ -7,7 +7,6 @@ use crate::table::number;
 
 /// The animation's controls and pictures, hidden until the script runs.
 const STAGE: &str = include_str!("scene.html");
-/// The script.
 const SCRIPT: &str = include_str!("scene.js");
 
 /// The section's content, as HTML.

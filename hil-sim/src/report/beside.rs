@@ -17,7 +17,6 @@ const AXIS_HEIGHT: u32 = 36;
 const COLOURS: [RGBColor; 2] = [palette::PRELOAD, palette::SPEED];
 
 /// The picture of two runs with their names: preload, position, slip and gap.
-#[must_use]
 pub fn beside_svg(runs: [(&str, &Recording); 2]) -> String {
     let views = runs.map(|(_, run)| View::new(run, Across::Time));
     let x = (0.0, views[0].x.1.max(views[1].x.1));

@@ -21,7 +21,6 @@ pub struct Difference {
     pub index: u8,
     /// Name of the quantity.
     pub quantity: &'static str,
-    /// Its unit.
     pub unit: &'static str,
     /// Decimals that are shown.
     #[serde(skip)]
@@ -35,7 +34,6 @@ pub struct Difference {
 }
 
 /// Every quantity of a crossing in either run; crossings of one step are paired in their order.
-#[must_use]
 pub fn differences(a: &Recording, b: &Recording) -> Vec<Difference> {
     let mut all = Vec::new();
     for (index, a, b) in pairs(a, b) {
@@ -67,7 +65,6 @@ fn pairs<'a>(a: &'a Recording, b: &'a Recording) -> Vec<Pair<'a>> {
 }
 
 /// The page of two runs with their names.
-#[must_use]
 pub fn compare_html((name_a, a): (&str, &Recording), (name_b, b): (&str, &Recording)) -> String {
     let mut page = head("two runs");
     for (letter, name, run) in [("A", name_a, a), ("B", name_b, b)] {

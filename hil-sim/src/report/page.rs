@@ -25,7 +25,6 @@ pub struct Section {
 
 /// The page of `recording`, with `more` sections. It needs no other file; without its
 /// script it lacks the animation alone.
-#[must_use]
 pub fn html(recording: &Recording, more: &[Section]) -> String {
     let s = &recording.summary;
     let title = escape(&format!("{} on {}, seed {}", s.direction, s.rig, s.seed));
@@ -85,7 +84,6 @@ and the undeformed wheel at the instant at which the lower wall stops carrying l
 }
 
 /// A page of its own: title, grade (`good`, `fair`, `bad`), headline and sections.
-#[must_use]
 pub fn page_of(title: &str, grade: &str, headline: &str, body: &str) -> String {
     let (title, headline) = (escape(title), escape(headline));
     head(&title)

@@ -3,47 +3,40 @@
 
 use plotters::style::RGBColor;
 
-/// Truth.
 pub const TRUTH: RGBColor = RGBColor(0x1f, 0x29, 0x37);
 /// References; drawn dashed, see [`DASHES`].
-pub const WANTED: RGBColor = RGBColor(0x6b, 0x72, 0x80);
+pub(crate) const WANTED: RGBColor = RGBColor(0x6b, 0x72, 0x80);
 /// Limits; drawn dashed, see [`DASHES`].
-pub const LIMIT: RGBColor = RGBColor(0xb9, 0x1c, 0x1c);
+pub(crate) const LIMIT: RGBColor = RGBColor(0xb9, 0x1c, 0x1c);
 
 /// First touch of a corner; drawn dashed, see [`DASHES`].
-pub const TOUCH: RGBColor = RGBColor(0xb4, 0x53, 0x09);
+pub(crate) const TOUCH: RGBColor = RGBColor(0xb4, 0x53, 0x09);
 /// Face of a step.
-pub const FACE: RGBColor = RGBColor(0x64, 0x74, 0x8b);
+pub(crate) const FACE: RGBColor = RGBColor(0x64, 0x74, 0x8b);
 
 /// Simulated by the reference models; drawn dashed, see [`DASHES`].
 pub const SIMULATED: RGBColor = RGBColor(0x1c, 0x6f, 0xd6);
 
-/// Speed.
 pub const SPEED: RGBColor = RGBColor(0x1d, 0x7f, 0xe0);
-/// Preload.
 pub const PRELOAD: RGBColor = RGBColor(0xe0, 0x7b, 0x12);
-/// Gap.
 pub const GAP: RGBColor = RGBColor(0xd0, 0x2f, 0x6b);
-/// Radius.
 pub const RADIUS: RGBColor = RGBColor(0x0f, 0x97, 0x97);
-/// Slip.
 pub const SLIP: RGBColor = RGBColor(0x35, 0xa1, 0x4a);
 /// Compression of the tread.
 pub const COMPRESSION: RGBColor = RGBColor(0x80, 0x5a, 0xd5);
 /// Force on the lower wall.
-pub const FLOOR: RGBColor = RGBColor(0x3d, 0x8e, 0xb9);
+pub(crate) const FLOOR: RGBColor = RGBColor(0x3d, 0x8e, 0xb9);
 
-/// Text.
 pub const TEXT: RGBColor = RGBColor(0x37, 0x41, 0x51);
 /// Axes.
-pub const AXIS: RGBColor = RGBColor(0x9c, 0xa3, 0xaf);
+pub(crate) const AXIS: RGBColor = RGBColor(0x9c, 0xa3, 0xaf);
 /// Lines of the grid.
 pub const GRID: RGBColor = RGBColor(0xe9, 0xeb, 0xef);
 /// Shaded stretches.
-pub const SHADE: RGBColor = RGBColor(0xfa, 0xf1, 0xdf);
+pub(crate) const SHADE: RGBColor = RGBColor(0xfa, 0xf1, 0xdf);
 
 /// Stroke colours that are drawn dashed, as SVG writes them, with their dashes.
-pub const DASHES: [(&str, &str); 4] =
+pub(crate) const DASHES: [(&str, &str); 4] =
     [("#6B7280", "11 7"), ("#B91C1C", "22 8"), ("#1C6FD6", "16 8"), ("#B45309", "5 6")];
 
 /// Pale fills for the modes, by mode number.
@@ -64,7 +57,7 @@ pub const MODES: [RGBColor; 13] = [
 ];
 
 /// Pale fills for how a run ended: well, with slip, not at all.
-pub const OUTCOMES: [RGBColor; 3] =
+pub(crate) const OUTCOMES: [RGBColor; 3] =
     [RGBColor(0xb9, 0xe3, 0xc3), RGBColor(0xfc, 0xe3, 0xa6), RGBColor(0xf4, 0xb8, 0xb8)];
 
 /// Pale fills for the contact stages, from number 1.
@@ -78,4 +71,4 @@ pub const STAGES: [RGBColor; 6] = [
 ];
 
 /// Pale fills for the sleeve levels, repeated.
-pub const LEVELS: [RGBColor; 2] = [RGBColor(0xe9, 0xec, 0xf1), RGBColor(0xd6, 0xdc, 0xe5)];
+pub(crate) const LEVELS: [RGBColor; 2] = [RGBColor(0xe9, 0xec, 0xf1), RGBColor(0xd6, 0xdc, 0xe5)];

@@ -297,7 +297,6 @@ fn rules(rows: &[Tick], across: Across, line: &CrossingLine) -> Vec<Rule> {
 }
 
 /// Speed, preload, gap and radius of a run over time, stacked, as an SVG of 1000 x 820.
-#[must_use]
 pub fn overview_svg(recording: &Recording) -> String {
     let view = View::new(recording, Across::Time);
     let mut panels = [view.speed(), view.preload(), view.gap()];

@@ -53,7 +53,6 @@ pub(crate) struct Geometry {
     pub(super) wheel_radius_mm: f64,
     /// Outermost wall from the pillar axis, mm.
     pub(super) wall_radius_mm: f64,
-    /// Arm length, mm.
     pub(super) arm_length_mm: f64,
     /// Arm's pivot from the pillar axis, mm.
     pub(super) arm_pivot_radius_mm: f64,

@@ -18,7 +18,7 @@ pub const SCALE: u32 = 2;
 
 /// An SVG of `size` CSS pixels that scales to its container, on transparent ground, with `name`
 /// for screen readers.
-pub fn fluid(size: (u32, u32), name: &str, draw: impl FnOnce(&Area) -> Drawn) -> String {
+pub(crate) fn fluid(size: (u32, u32), name: &str, draw: impl FnOnce(&Area) -> Drawn) -> String {
     let attributes = format!(r#"role="img" aria-label="{}""#, escape(name));
     picture(size, &attributes, draw)
 }
@@ -65,7 +65,7 @@ pub fn text_width(text: &str, px: f64) -> i32 {
 }
 
 /// `text` with what HTML would read as mark-up escaped.
-pub fn escape(text: &str) -> String {
+pub(crate) fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 

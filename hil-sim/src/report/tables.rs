@@ -60,7 +60,6 @@ fn with_unit(value: impl Into<Option<f64>>, decimals: usize, unit: &str) -> Stri
     value.map_or_else(String::new, |value| format!("{} {unit}", number(value, decimals)))
 }
 
-/// The ledger of the crossings.
 pub(super) fn ledger(crossings: &[CrossingLine]) -> String {
     if crossings.is_empty() {
         return "<p>No step was crossed.</p>\n".to_owned();
@@ -108,7 +107,6 @@ pub(super) fn reports(s: &Summary) -> String {
     injected + &table("lines", &[], rows.collect())
 }
 
-/// The log.
 pub(super) fn log(lines: &[LogLine]) -> String {
     if lines.is_empty() {
         return "<p>The log is empty.</p>\n".to_owned();

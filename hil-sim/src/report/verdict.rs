@@ -81,7 +81,6 @@ pub(crate) fn slip_sentence(summary: &Summary) -> String {
     format!("{} {} mm", slip_name(summary), number(summary.slip_mm, 3))
 }
 
-/// What the slip of this summary is.
 pub(crate) fn slip_name(summary: &Summary) -> &'static str {
     if summary.measured { "measured slip with creep" } else { "gross slip" }
 }

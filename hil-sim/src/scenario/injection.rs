@@ -46,7 +46,6 @@ pub struct Injection {
 
 impl Injection {
     /// A permanent fault from `at_s` on.
-    #[must_use]
     pub const fn at(target: Target, kind: Kind, at_s: f64, magnitude: f64) -> Self {
         Self {
             target,
@@ -60,13 +59,11 @@ impl Injection {
     }
 
     /// Whether it resets the board, at once or by the watchdog.
-    #[must_use]
     pub const fn resets_board(&self) -> bool {
         self.target.resets_board(self.kind)
     }
 
     /// The onset; time 0 if there is none.
-    #[must_use]
     pub fn from(&self) -> Onset {
         match (self.at_s, self.at_mm, self.at_crossing) {
             (_, Some(mm), _) => Onset::Position(mm),
@@ -76,7 +73,6 @@ impl Injection {
     }
 
     /// Magnitude; by default that of the catalogue.
-    #[must_use]
     pub fn magnitude(&self) -> f64 {
         let usual = entry(self.target, self.kind).map_or(0.0, |entry| entry.magnitude);
         self.magnitude.unwrap_or(usual)

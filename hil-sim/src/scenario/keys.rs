@@ -19,7 +19,6 @@ pub struct KeyInfo {
     pub key: String,
     /// Unit of its value; empty if it has none.
     pub unit: &'static str,
-    /// Its value.
     #[serde(rename = "default")]
     pub value: Value,
     /// What it takes.

@@ -6,7 +6,6 @@ use serde::{Deserialize, Serialize};
 
 use super::injection::Injection;
 
-/// Options of one run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, DocumentedFields)]
 #[serde(deny_unknown_fields)]
 pub struct RunOptions {
@@ -39,10 +38,8 @@ pub enum Direction {
 
 impl Direction {
     /// Names as written in scenarios and summaries.
-    pub const NAMES: [&str; 2] = ["deploy", "retract"];
+    pub(crate) const NAMES: [&str; 2] = ["deploy", "retract"];
 
-    /// Its name.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         Self::NAMES[self as usize]
     }
@@ -74,10 +71,8 @@ pub enum ControllerKind {
 
 impl ControllerKind {
     /// Names as written in scenarios and summaries.
-    pub const NAMES: [&str; 4] = ["scheduled", "constant", "limit", "reactive"];
+    pub(crate) const NAMES: [&str; 4] = ["scheduled", "constant", "limit", "reactive"];
 
-    /// Its name.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         Self::NAMES[self as usize]
     }
@@ -99,7 +94,7 @@ pub enum MismatchDraw {
 
 impl MismatchDraw {
     /// Names as written in scenarios.
-    pub const NAMES: [&str; 3] = ["stated", "wide", "adversarial"];
+    pub(crate) const NAMES: [&str; 3] = ["stated", "wide", "adversarial"];
 }
 
 /// One step that is not where the step table says. Steps count from 1 on
@@ -109,26 +104,20 @@ impl MismatchDraw {
 pub enum StepAnomaly {
     /// The step is nearer to the stow end than the table says.
     Early {
-        /// Which step.
         step: u8,
         /// By how much, mm, positive.
         offset_mm: f64,
     },
     /// The step is farther out than the table says.
     Late {
-        /// Which step.
         step: u8,
         /// By how much, mm, positive.
         offset_mm: f64,
     },
     /// The step is not there.
-    Missing {
-        /// Which step.
-        step: u8,
-    },
+    Missing { step: u8 },
     /// The step is higher than the table says.
     Higher {
-        /// Which step.
         step: u8,
         /// By how much, mm, positive.
         offset_mm: f64,

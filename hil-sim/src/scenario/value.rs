@@ -48,9 +48,6 @@ pub(super) fn has_unit(text: &str) -> bool {
 }
 
 /// `value` in the form that `kind` has in a scenario.
-///
-/// # Errors
-/// What the key takes instead.
 pub(super) fn checked(
     origin: &str,
     key: &str,

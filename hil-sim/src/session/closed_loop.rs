@@ -48,10 +48,6 @@ pub struct Session {
 
 impl Session {
     /// A session before its first tick, see [`initial_rig`].
-    ///
-    /// # Errors
-    /// [`RunError::Rig`] if the parameters do not make a controller, [`RunError::Refused`] if
-    /// they do not make a plant, [`RunError::Hardware`] if a fault takes a board.
     pub fn new(scenario: &Scenario, options: Options) -> Result<Self, RunError> {
         if let Some(fault) = scenario.run.faults.iter().find(|f| f.target.is_hardware()) {
             let (target, kind) = (fault.target.name(), fault.kind.name());
@@ -87,37 +83,30 @@ impl Session {
     }
 
     /// The same session with every stage of the controller run in every tick.
-    #[must_use]
     pub fn without_skipping(mut self) -> Self {
         self.controller = self.controller.without_skipping();
         self
     }
 
     /// The same session with the binary log kept, whether rows are or not.
-    #[must_use]
     pub fn logging(mut self) -> Self {
         self.stream.get_or_insert_with(|| Stream::new(&self.scenario, &self.controller));
         self
     }
 
     /// The same with every ring element visited, see [`VirtualRig::visiting_all`].
-    #[must_use]
     pub fn visiting_all(mut self) -> Self {
         self.plant = self.plant.visiting_all();
         self
     }
 
     /// The same session on a plant that is changed like this; the controller does not know.
-    #[must_use]
     pub fn with_plant(mut self, change: impl FnOnce(&mut VirtualRig)) -> Self {
         change(&mut self.plant);
         self
     }
 
     /// One millisecond with an operator's command or none.
-    ///
-    /// # Errors
-    /// [`RunError::Plant`] if the plant's state becomes invalid.
     pub fn step(&mut self, command: Option<Command>) -> Result<Output, RunError> {
         let frame = self.sense();
         self.advance(&frame, command)
@@ -149,9 +138,6 @@ impl Session {
 
     /// The control tick on what `sensors` holds, then the plant's millisecond under
     /// its output.
-    ///
-    /// # Errors
-    /// [`RunError::Plant`] if the plant's state becomes invalid.
     pub fn advance(
         &mut self,
         sensors: &SensorFrame,
@@ -205,20 +191,17 @@ impl Session {
     }
 
     /// When a fault first acted, see [`FaultInjector::acts_s`], s since boot.
-    #[must_use]
     pub fn acts_s(&self) -> Option<f64> {
         self.injector.as_ref().and_then(FaultInjector::acts_s)
     }
 
     /// When the readback first had to show a fault, see [`FaultInjector::tells_s`], s since
     /// boot.
-    #[must_use]
     pub fn tells_s(&self) -> Option<f64> {
         self.injector.as_ref().and_then(FaultInjector::tells_s)
     }
 
     /// When the first of the scenario's faults came, s since boot.
-    #[must_use]
     pub fn struck_s(&self) -> Option<f64> {
         self.injector.as_ref().and_then(FaultInjector::struck_s)
     }
@@ -233,7 +216,6 @@ impl Session {
     }
 
     /// The snapshot of the last tick that memory keeps over a reset.
-    #[must_use]
     pub fn record(&self) -> DriveSnapshot {
         SnapshotRecorder::default().snapshot(
             &self.held.telemetry,
@@ -274,19 +256,15 @@ impl Session {
     }
 
     /// The controller's mode.
-    #[must_use]
     pub const fn mode(&self) -> Mode {
         self.state.mode()
     }
 
     /// Time since boot, s.
-    #[must_use]
     pub fn time_s(&self) -> f64 {
         f64::from(self.tick) * TICK_S
     }
 
-    /// The plant.
-    #[must_use]
     pub const fn plant(&self) -> &VirtualRig {
         &self.plant
     }
@@ -297,7 +275,6 @@ impl Session {
     }
 
     /// The recording of a session that ends here; it took `wall_s` to compute.
-    #[must_use]
     pub fn finish(self, wall_s: f64) -> Recording {
         let arrived = match self.state.mode() {
             Mode::Complete(direction) => Some(direction),
@@ -313,9 +290,6 @@ impl Session {
 /// The plant of a scenario and its sensors before the first tick: for deployment with the wheel
 /// unloaded at the stow end; for retraction where deployment ended, pressed at the end of
 /// travel.
-///
-/// # Errors
-/// [`Refusal`] if the plant of this seed cannot be computed.
 pub fn initial_rig(scenario: &Scenario) -> Result<(VirtualRig, Sensors), Refusal> {
     let parameters = scenario.plant();
     parameters.check(scenario.rig.preload.limit_n)?;
@@ -341,7 +315,6 @@ pub fn read(sensors: &mut Sensors, plant: &VirtualRig) -> Codes {
 }
 
 /// Bridge commands as the plant sees them.
-#[must_use]
 pub fn drives(drive: MotorCommand, preload: MotorCommand) -> Drives {
     let duty = |command: MotorCommand| f64::from(command.duty.to_bits()) / 32_768.0;
     Drives {

@@ -15,7 +15,6 @@ pub struct Stream {
 
 impl Stream {
     /// A log of this controller from its first tick on.
-    #[must_use]
     pub fn new(scenario: &Scenario, controller: &Controller) -> Self {
         Self { encoder: LogEncoder::new(of(scenario, controller)), bytes: Vec::new() }
     }
@@ -59,7 +58,6 @@ impl Stream {
     }
 
     /// The rest of the log.
-    #[must_use]
     pub fn finish(mut self) -> Vec<u8> {
         self.encoder.flush(&mut into(&mut self.bytes));
         self.bytes

@@ -39,7 +39,6 @@ const STIFFNESS: Range = Range::Decades(1e6, 1e12);
 const STIFFENING: Range = Range::Decades(1.0, 100.0);
 /// Relaxation time, s.
 const TAU: Range = Range::Decades(1e-6, 1e3);
-/// Step of time, s.
 const STEP_OF_TIME: Range = Range::Decades(1e-6, 20e-3);
 /// Moved mass over the drive's reflected mass.
 const MASS_RATIO: Range = Range::Decades(1e-3, 1e3);
@@ -47,9 +46,7 @@ const MASS_RATIO: Range = Range::Decades(1e-3, 1e3);
 const SPEED: Range = Range::Even(0.0, 2000.0);
 /// Height of the step, mm.
 const STEP: Range = Range::Even(0.0, 20.0);
-/// Friction.
 const FRICTION: Range = Range::Even(0.0, 3.0);
-/// Preload, N.
 const PRELOAD: Range = Range::Decades(5.0, 150.0);
 /// Axial load, N.
 const LOAD: Range = Range::Even(0.0, 60.0);
@@ -82,7 +79,6 @@ impl Course {
         [Self::Forward, Self::Back, Self::Reversing, Self::Rocking, Self::Coasting];
 
     /// Speed in parts of the full one at this part of the run.
-    #[must_use]
     pub fn speed(self, part: f64) -> f64 {
         match self {
             Self::Forward => 1.0,
@@ -104,7 +100,6 @@ pub struct StressCase {
     pub index: usize,
     /// Relaxed stiffness of the contact, Pa/m.
     pub k_inf_pa_per_m: f64,
-    /// Stiffening.
     pub stiffening: f64,
     /// Relaxation time, s.
     pub tau_s: f64,
@@ -114,13 +109,11 @@ pub struct StressCase {
     pub mass_ratio: f64,
     /// Moved mass, kg.
     pub mass_kg: f64,
-    /// Speed, mm/s.
     pub speed_mm_s: f64,
     /// Height of the step, mm.
     pub step_mm: f64,
     /// Friction.
     pub mu: f64,
-    /// Preload, N.
     pub preload_n: f64,
     /// Axial load, N.
     pub load_n: f64,
@@ -171,7 +164,6 @@ const PARTS: (f64, f64, f64) = (0.4, 0.3, 0.2);
 /// The first `count` cases of the stress with this seed: every fourth corner of the
 /// eight ranges for small counts, all corners from a thousand cases on, the rest from
 /// the sequence.
-#[must_use]
 pub(super) fn draw(count: usize, seed: u64) -> Vec<StressCase> {
     let every = if count < 1000 { 4 } else { 1 };
     let corners = (0..1 << ENDS).step_by(every).map(corner);
@@ -193,7 +185,6 @@ fn deepest(step_mm: f64) -> f64 {
 
 /// Impossible cases, each with the name of its refusal: the first `count`, pressed with more
 /// than the tread carries, or braked with more momentum than it takes.
-#[must_use]
 pub(super) fn beyond(count: usize, seed: u64) -> Vec<(StressCase, &'static str)> {
     let changed = |case: StressCase| {
         if case.index.is_multiple_of(3) {

@@ -28,7 +28,6 @@ const COLOURS: [plotters::style::RGBColor; 6] = [
 pub struct Plot {
     /// Its name in the rows.
     pub column: &'static str,
-    /// Its title.
     pub title: &'static str,
     /// Name of its axis, with the unit.
     pub y_name: &'static str,
@@ -37,7 +36,6 @@ pub struct Plot {
 }
 
 /// The picture as SVG; none if no key has numbers.
-#[must_use]
 pub fn picture(axes: &[Axis], rows: &[Map<String, Value>], plots: &[Plot]) -> Option<String> {
     let is_numeric = |axis: &&Axis| axis.values.iter().all(|value| value.parse::<f64>().is_ok());
     let x = axes.iter().find(is_numeric)?;

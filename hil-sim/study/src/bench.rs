@@ -8,7 +8,6 @@ pub mod cycles;
 pub mod model;
 pub mod page;
 pub mod peers;
-mod python;
 
 use std::hint::black_box;
 
@@ -29,8 +28,6 @@ const REPEATS: usize = 5;
 /// What is measured.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Options {
-    /// Other engines and solvers too; sets up what they need.
-    pub peers: bool,
     /// Cycles on the emulated core; builds it if need be.
     pub cycles: bool,
     /// Two resolutions of the plant instead of all.
@@ -46,12 +43,9 @@ pub struct Report {
     pub tick: Option<Tick>,
     /// Why there are no cycles.
     pub cycles_left_out: Option<String>,
-    /// The plant.
     pub plant: Plant,
-    /// Other engines and solvers, if they were asked for and available.
-    pub peers: Option<Peers>,
-    /// Why they are left out.
-    pub peers_left_out: Option<String>,
+    /// Other engines and solvers, as `peers/run.py` measured them.
+    pub peers: Peers,
 }
 
 /// Error and time of the plant by resolution.
@@ -67,7 +61,6 @@ pub struct Plant {
 
 impl Plant {
     /// The default setting's errors and time.
-    #[must_use]
     pub fn usual(&self) -> Option<&Point> {
         self.settings.iter().find(|point| {
             (point.elements, point.stride_mm) == (self.default.elements, self.default.stride_mm)
@@ -76,9 +69,6 @@ impl Plant {
 }
 
 /// Measures; `say` is called with each part's name.
-///
-/// # Errors
-/// If the model cannot be built, a crossing cannot be balanced, or core and host differ.
 pub fn measure(options: Options, say: &dyn Fn(&str)) -> Result<Report> {
     let one_line = |error: &anyhow::Error| Some(format!("{error:#}").replace('\n', " "));
     say("reduced model");
@@ -101,16 +91,8 @@ pub fn measure(options: Options, say: &dyn Fn(&str)) -> Result<Report> {
     let (sweep, repeats) =
         if options.quick { (vec![coarse, default], 1) } else { (Setting::sweep(), REPEATS) };
     let settings = work_precision(&Rig::prototype(), &sweep, repeats, || ())?;
-    let (peers, peers_left_out) = if options.peers {
-        match peers::compare(say) {
-            Ok(peers) => (Some(peers), None),
-            Err(error) => (None, one_line(&error)),
-        }
-    } else {
-        (None, Some("not asked for: `rig bench --peers` sets them up".to_owned()))
-    };
     let plant = Plant { finer: FINER, default, settings };
-    Ok(Report { variants, tick, cycles_left_out, plant, peers, peers_left_out })
+    Ok(Report { variants, tick, cycles_left_out, plant, peers: Peers::stored()? })
 }
 
 /// Repeats after the run that warms up.

@@ -44,7 +44,6 @@ impl Verb {
 }
 
 /// Runs the command with the arguments of this process.
-#[must_use]
 pub fn main() -> ExitCode {
     hil_sim::cli::run(|cli: &Cli| cli.verb.run())
 }

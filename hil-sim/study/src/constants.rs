@@ -20,7 +20,6 @@ use data::Row;
 use design::{DesignPoint, Use};
 
 /// All crossings of the file, in its order.
-#[must_use]
 pub fn plan() -> Vec<(DesignPoint, Use)> {
     let formula = Formula::new(&Rig::fe());
     let mut all = Vec::new();
@@ -33,9 +32,6 @@ pub fn plan() -> Vec<(DesignPoint, Use)> {
 }
 
 /// The crossings of the file in place.
-///
-/// # Errors
-/// If there is none or it is not well formed.
 pub fn stored() -> Result<Vec<Row>> {
     let path = data::path();
     let text = std::fs::read_to_string(&path).with_context(|| format!("{}", path.display()))?;
@@ -43,9 +39,6 @@ pub fn stored() -> Result<Vec<Row>> {
 }
 
 /// The source of `src/model/constants.rs` that follows from the crossings.
-///
-/// # Errors
-/// If a fit is singular or out of range.
 pub fn source(rows: &[Row]) -> Result<String> {
     let formula = Formula::new(&Rig::fe());
     let mut source = String::from(

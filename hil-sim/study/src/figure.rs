@@ -26,7 +26,6 @@ pub enum Source {
 
 impl Source {
     /// Name in the legend.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::Theory => "theory",
@@ -58,13 +57,10 @@ pub struct Series {
 
 impl Series {
     /// A series without name and range.
-    #[must_use]
     pub fn new(source: Source, points: Vec<(f64, f64)>) -> Self {
         Self { source, name: String::new(), points, range: Vec::new() }
     }
 
-    /// A method of this number.
-    #[must_use]
     pub fn method(number: usize, name: &str, points: Vec<(f64, f64)>) -> Self {
         Self { name: name.to_owned(), ..Self::new(Source::Method(number), points) }
     }
@@ -78,7 +74,6 @@ impl Series {
     }
 
     /// Its entry in the legend.
-    #[must_use]
     pub fn legend(&self) -> (Source, &str) {
         let method = matches!(self.source, Source::Method(_));
         (self.source, if method { &self.name } else { self.source.name() })
@@ -88,7 +83,6 @@ impl Series {
 /// One plot.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Panel {
-    /// Title.
     pub title: String,
     /// Name and unit of the horizontal axis.
     pub x: String,
@@ -107,7 +101,6 @@ pub struct Panel {
 
 impl Panel {
     /// A plot with these names and units of its axes.
-    #[must_use]
     pub fn new(title: impl Into<String>, x: &str, y: &str, series: Vec<Series>) -> Self {
         let (title, x, y) = (title.into(), x.into(), y.into());
         let (categories, logarithmic, least_y) = (Vec::new(), false, None);
@@ -115,13 +108,11 @@ impl Panel {
     }
 
     /// The same with logarithmic axes.
-    #[must_use]
     pub fn logarithmic(self) -> Self {
         Self { logarithmic: true, ..self }
     }
 
     /// A plot of marks at x = 0, 1, ... with these names.
-    #[must_use]
     pub fn of_categories(
         title: &str,
         (x, categories): (&str, Vec<String>),
@@ -160,7 +151,6 @@ pub struct Ours {
 
 impl Mark {
     /// A published number, and ours by source.
-    #[must_use]
     pub fn new(
         what: String,
         unit: &'static str,
@@ -174,7 +164,6 @@ impl Mark {
         mark
     }
 
-    /// Adds a source.
     pub fn add(&mut self, source: Source, value: f64) {
         self.ours.push(Ours { source, value, deviation: value / self.published - 1.0 });
     }
@@ -187,7 +176,6 @@ pub struct Figure {
     pub id: &'static str,
     /// Name of the file.
     pub file: String,
-    /// Title.
     pub title: &'static str,
     /// What is shown and how it was got.
     pub caption: String,
@@ -201,7 +189,6 @@ pub struct Figure {
 
 impl Figure {
     /// A figure without published numbers, in the file of its name.
-    #[must_use]
     pub fn new(
         id: &'static str,
         title: &'static str,
@@ -235,7 +222,6 @@ pub struct Claim {
 
 impl Claim {
     /// The verdict, as the page has it.
-    #[must_use]
     pub const fn verdict(&self) -> &'static str {
         match (self.holds, self.fitted) {
             (true, false) => "holds",
@@ -245,21 +231,18 @@ impl Claim {
     }
 
     /// A claim of `figure`, made in `section`, not yet judged.
-    #[must_use]
     pub fn of(figure: &'static str, section: &'static str, id: &'static str) -> Self {
         let (claim, holds, fitted, why) = ("", false, false, String::new());
         Self { id, figure, section, claim, holds, fitted, why }
     }
 
     /// The same, with a parameter of ours fitted to it.
-    #[must_use]
     pub fn fitted(self) -> Self {
         Self { fitted: true, ..self }
     }
 
     /// What the claim says, whether it holds, what was found, and the reason if it does
     /// not hold.
-    #[must_use]
     pub fn judged(self, claim: &'static str, holds: bool, found: String, but: &str) -> Self {
         let why = if holds || but.is_empty() { found } else { format!("{found} {but}") };
         Self { claim, holds, why, ..self }

@@ -40,8 +40,6 @@ const METHODS: [RGBColor; 7] = [
     palette::SLIP,
 ];
 
-/// The figure as SVG.
-#[must_use]
 pub fn svg(figure: &Figure) -> String {
     let columns = figure.columns.clamp(1, COLUMNS);
     let rows = figure.panels.len().div_ceil(columns) as u32;

@@ -28,7 +28,6 @@ pub struct ModelFigures {
     pub bare_arm_hz: Vec<f64>,
     /// Of the arm with the fitted mass at its tip.
     pub arm_hz: Vec<f64>,
-    /// Of that arm on the tread.
     pub arm_on_tread_hz: Vec<f64>,
     /// Published: first constrained and seventh free mode, Hz.
     pub published_hz: [f64; 2],
@@ -39,9 +38,7 @@ pub struct ModelFigures {
 pub struct CaseFigures {
     /// Axial speed, mm/s.
     pub speed_mm_s: f64,
-    /// Preload, N.
     pub preload_n: f64,
-    /// Published gap, mm.
     pub published_gap_mm: f64,
     /// Gap without inertia, mm; the tread is fitted to it.
     pub gap_mm: f64,
@@ -100,10 +97,6 @@ fn still(case: &ReferenceCase) -> Result<CrossingResult, BalanceError> {
     })
 }
 
-/// Computes them.
-///
-/// # Errors
-/// If a crossing cannot be balanced or the arm is out of range.
 pub fn compute() -> Result<ModelFigures> {
     let computed: Vec<(CaseFigures, f64)> =
         (0..3).into_par_iter().map(of_case).collect::<Result<_>>()?;
@@ -173,9 +166,6 @@ fn of_rubber(name: &'static str, rubber: &Rubber) -> RubberFigures {
 
 /// Gap and collision force of the ring over preload at 5 and 8 mm/s, with the published
 /// values.
-///
-/// # Errors
-/// If a crossing cannot be computed.
 pub fn figure() -> Result<Figure> {
     let (mut gaps, mut forces) = (Vec::new(), Vec::new());
     for (number, speed) in [(1, 5.0), (2, 8.0)] {

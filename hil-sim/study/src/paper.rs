@@ -49,7 +49,6 @@ pub struct Study {
 }
 
 /// Deployments that [`regenerate`] runs.
-#[must_use]
 pub fn runs() -> usize {
     cases().len() * published::RUNS
 }
@@ -74,9 +73,6 @@ fn cases() -> Vec<Case> {
 
 /// Runs the experiments, computes theory and simulation, and judges the claims. `done`
 /// is called after each deployment.
-///
-/// # Errors
-/// If a deployment or a reference fails.
 pub fn regenerate(done: &(dyn Fn() + Sync)) -> Result<Study> {
     let experiments = experiment::run_all(&cases(), done)?;
     let find = |wanted: &[Case]| -> Vec<&Experiment> {
@@ -123,9 +119,6 @@ pub fn regenerate(done: &(dyn Fn() + Sync)) -> Result<Study> {
 
 /// The study's figures and claims as JSON, values to four figures: what a comparison
 /// across builds can rely on.
-///
-/// # Errors
-/// Never for a study; what the serialiser says otherwise.
 pub fn json(study: &Study) -> serde_json::Result<String> {
     let mut value = serde_json::to_value(study)?;
     round(&mut value);

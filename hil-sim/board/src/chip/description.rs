@@ -18,16 +18,13 @@ pub enum FieldAccess {
     Write,
     /// Set it or start something by a 1.
     SetByOne,
-    /// Clear it by a 1.
     ClearByOne,
-    /// Clear it by a 0.
     ClearByZero,
 }
 
 /// A field of a register.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Field {
-    /// Name.
     pub name: &'static str,
     /// Its bits in the register.
     pub mask: u32,
@@ -42,7 +39,6 @@ pub struct Register {
     pub peripheral: &'static str,
     /// Name of the register.
     pub name: &'static str,
-    /// Address.
     pub address: u32,
     /// Value after reset.
     pub reset: u32,
@@ -131,7 +127,6 @@ pub fn at(address: u32) -> &'static [Register] {
     &registers[range]
 }
 
-/// The register of this name.
 pub fn find(peripheral: &str, name: &str) -> Option<&'static Register> {
     registers().iter().find(|register| register.peripheral == peripheral && register.name == name)
 }

@@ -15,7 +15,6 @@ impl Pin {
     pub const STOP_PRELOAD: Self = Self(1, 7);
     /// Button: high is pressed.
     pub const BUTTON: Self = Self(2, 13);
-    /// Light.
     pub const LIGHT: Self = Self(0, 5);
     /// Select line of the angle sensor: low selects.
     const SELECT: Self = Self(1, 10);
@@ -127,7 +126,6 @@ impl Chip {
         self.ports[pin.0].role(pin.1)
     }
 
-    /// Level at a pin.
     pub fn level(&self, pin: Pin) -> bool {
         self.ports[pin.0].level(pin.1)
     }

@@ -28,9 +28,7 @@ use unicorn_engine::{
 };
 
 use self::count::Count;
-use super::{
-    Access as Touch, Bus, Core, CoreError, Fault, Mark, Meter, NoBus, Register, Stop, passes,
-};
+use super::{Access as Touch, Bus, CoreError, Fault, Mark, Meter, NoBus, Register, Stop, passes};
 use crate::timing;
 
 /// Memory of the board.
@@ -112,7 +110,6 @@ pub struct UnicornCore<B: Bus + 'static = NoBus> {
     guards: Vec<(u32, u32)>,
     /// Hooks of deferred instructions, by their addresses.
     own: Vec<(u32, UcHookId)>,
-    /// The hook of all of them.
     common: Option<UcHookId>,
     /// The hook of reads of spoilt flash.
     reads: Option<UcHookId>,
@@ -133,7 +130,6 @@ fn forget_condition<B: Bus>(uc: &mut Hooked<'_, B>) -> Result<(), uc_error> {
 
 impl UnicornCore {
     /// A core with these memories and nothing else, counting the cycles of `counted`.
-    /// Errors: [`CoreError::Engine`] if the engine cannot be had or a memory overlaps.
     pub fn new(memories: &[Memory], counted: &Counted<'_>) -> Result<Self, CoreError> {
         Self::with_bus(memories, counted, NoBus)
     }
@@ -141,7 +137,6 @@ impl UnicornCore {
 
 impl<B: Bus + 'static> UnicornCore<B> {
     /// A core with these memories and a bus, counting the cycles of `counted`.
-    /// Errors: as [`UnicornCore::new`].
     pub fn with_bus(memories: &[Memory], counted: &Counted<'_>, bus: B) -> Result<Self, CoreError> {
         let ranges = bus.ranges();
         let inside =
@@ -174,7 +169,6 @@ impl<B: Bus + 'static> UnicornCore<B> {
         Ok(core)
     }
 
-    /// The bus.
     pub fn bus(&self) -> &B {
         &self.engine.get_data().bus
     }
@@ -186,7 +180,6 @@ impl<B: Bus + 'static> UnicornCore<B> {
 
     /// Sets the places, address and bytes, that the program may not access; everything else in
     /// RAM it may. The host's accesses are not affected.
-    /// Errors: [`CoreError::Engine`] if a place is no whole number of pages of a memory.
     pub fn set_guards(&mut self, guards: Vec<(u32, u32)>) -> Result<(), CoreError> {
         for (base, size) in std::mem::replace(&mut self.guards, guards) {
             let freed = self.engine.mem_protect(base.into(), size.into(), Prot::ALL);
@@ -207,7 +200,6 @@ impl<B: Bus + 'static> UnicornCore<B> {
 
     /// Sets the places of flash, address and bytes, whose reads the bus is told of. Slow while
     /// there are some: the engine calls a hook at every read.
-    /// Errors: [`CoreError::Engine`] if the engine refuses.
     pub fn set_spoilt(&mut self, spoilt: Vec<(u32, u32)>) -> Result<(), CoreError> {
         if self.engine.get_data().spoilt == spoilt {
             return Ok(());
@@ -233,7 +225,6 @@ impl<B: Bus + 'static> UnicornCore<B> {
 
     /// Counts what the flash's wait states cost from now on, see [`crate::accelerator`]. Slow: the
     /// engine calls a hook at every read.
-    /// Errors: [`CoreError::Engine`] if the engine refuses.
     pub fn count_waits(&mut self, flash: Memory) -> Result<(), CoreError> {
         self.engine.get_data_mut().count.count_waits();
         let (first, last) = (flash.base.into(), (flash.base + (flash.size - 1)).into());
@@ -361,12 +352,15 @@ fn name(register: Register) -> i32 {
     }
 }
 
-impl<B: Bus + 'static> Core for UnicornCore<B> {
-    fn read(&self, address: u32, into: &mut [u8]) -> Result<(), CoreError> {
+/// Every method fails if the engine refuses, as for an address without memory.
+impl<B: Bus + 'static> UnicornCore<B> {
+    /// Reads memory.
+    pub fn read(&self, address: u32, into: &mut [u8]) -> Result<(), CoreError> {
         engine("read memory", self.engine.mem_read(address.into(), into))
     }
 
-    fn write(&mut self, address: u32, bytes: &[u8]) -> Result<(), CoreError> {
+    /// Writes memory, flash too.
+    pub fn write(&mut self, address: u32, bytes: &[u8]) -> Result<(), CoreError> {
         engine("write memory", self.engine.mem_write(address.into(), bytes))?;
         let count = &self.engine.get_data().count;
         if (address.wrapping_sub(count.base) as usize) < count.bytes.len() {
@@ -377,12 +371,13 @@ impl<B: Bus + 'static> Core for UnicornCore<B> {
         Ok(())
     }
 
-    fn register(&self, register: Register) -> Result<u32, CoreError> {
+    /// A register's value.
+    pub fn register(&self, register: Register) -> Result<u32, CoreError> {
         let value = engine("read a register", self.engine.reg_read(name(register)))?;
         Ok(value as u32)
     }
 
-    fn set_register(&mut self, register: Register, value: u32) -> Result<(), CoreError> {
+    pub fn set_register(&mut self, register: Register, value: u32) -> Result<(), CoreError> {
         let uc = &mut self.engine;
         if register == Register::Xpsr {
             // The first name sets every field; only the second makes the engine apply the new
@@ -394,11 +389,14 @@ impl<B: Bus + 'static> Core for UnicornCore<B> {
         engine("set a register", uc.reg_write(name(register), value.into()))
     }
 
-    fn run(&mut self, address: u32, cycles: u64) -> Result<Stop, CoreError> {
+    /// Runs from `address` until something stops the core, `cycles` at most.
+    pub fn run(&mut self, address: u32, cycles: u64) -> Result<Stop, CoreError> {
         self.go(address, cycles, (u64::MAX, 0))
     }
 
-    fn step(&mut self, address: u32) -> Result<Stop, CoreError> {
+    /// Executes the instruction at `address`, or the conditional block that begins there. Slow:
+    /// the engine translates again.
+    pub fn step(&mut self, address: u32) -> Result<Stop, CoreError> {
         let before = self.meter();
         engine("forget code", self.engine.ctl_flush_tb())?;
         let stop = self.go(address, 1, (u64::MAX, 1))?;
@@ -414,7 +412,8 @@ impl<B: Bus + 'static> Core for UnicornCore<B> {
         })
     }
 
-    fn run_to(&mut self, address: u32, cycles: u64, until: u32) -> Result<Stop, CoreError> {
+    /// The same, or until the program gets to `until`. Slow: the engine translates again.
+    pub fn run_to(&mut self, address: u32, cycles: u64, until: u32) -> Result<Stop, CoreError> {
         engine("forget code", self.engine.ctl_flush_tb())?;
         let stop = self.go(address, cycles, (u64::from(until & !1), 0))?;
         engine("forget code", self.engine.ctl_flush_tb())?;
@@ -424,19 +423,23 @@ impl<B: Bus + 'static> Core for UnicornCore<B> {
         })
     }
 
-    fn pass(&mut self, cycles: u64) {
+    /// Lets time pass in which no instruction is executed.
+    pub fn pass(&mut self, cycles: u64) {
         self.engine.get_data_mut().count.meter.cycles += cycles;
     }
 
-    fn meter(&self) -> Meter {
+    /// Cycles and instructions so far.
+    pub fn meter(&self) -> Meter {
         self.engine.get_data().count.meter
     }
 
-    fn mark(&mut self, address: u32) {
+    /// Notes from now on when the program gets to this address.
+    pub fn mark(&mut self, address: u32) {
         self.engine.get_data_mut().count.mark(address & !1);
     }
 
-    fn take_marks(&mut self, marks: &mut Vec<Mark>) {
+    /// Moves the notes since the last call into `marks`, in their order.
+    pub fn take_marks(&mut self, marks: &mut Vec<Mark>) {
         marks.append(&mut self.engine.get_data_mut().marks);
     }
 }

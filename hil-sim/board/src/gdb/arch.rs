@@ -2,7 +2,6 @@
 
 use gdbstub::arch::{Arch, Registers};
 
-/// A Cortex-M.
 pub(super) enum CortexM {}
 
 /// R0 to R12, stack pointer, link register, program counter, xPSR.

@@ -1,19 +1,17 @@
 //! Access of a debug probe to memory and core registers.
 
 use super::Machine;
-use crate::core::{Core, CoreError, Register};
+use crate::core::{CoreError, Register};
 use crate::elf::FLASH;
 use crate::peripherals::flash::Wrong;
 
 impl Machine {
     /// Reads memory, as a debug probe does.
-    /// Errors: [`CoreError::Engine`] if nothing lies there.
     pub fn peek(&self, address: u32, into: &mut [u8]) -> Result<(), CoreError> {
         self.core.read(address, into)
     }
 
     /// Address of the first occurrence of these bytes in flash.
-    /// Errors: [`CoreError::Engine`] if flash cannot be read.
     pub fn find(&self, bytes: &[u8]) -> Result<Option<u32>, CoreError> {
         let mut flash = vec![0; FLASH.size as usize];
         self.core.read(FLASH.base, &mut flash)?;
@@ -22,7 +20,6 @@ impl Machine {
     }
 
     /// A word of memory.
-    /// Errors: [`CoreError::Engine`] if nothing lies there.
     pub fn word(&self, address: u32) -> Result<u32, CoreError> {
         let mut bytes = [0; 4];
         self.core.read(address, &mut bytes)?;
@@ -30,14 +27,12 @@ impl Machine {
     }
 
     /// Writes memory, as a debug probe does.
-    /// Errors: [`CoreError::Engine`] if nothing lies there.
     pub fn poke(&mut self, address: u32, bytes: &[u8]) -> Result<(), CoreError> {
         self.core.write(address, bytes)
     }
 
     /// Makes bits of the double word of flash at this address wrong: one, which the chip corrects,
     /// or two, which also change in the memory.
-    /// Errors: [`CoreError::Engine`] if the engine fails.
     pub fn spoil(&mut self, address: u32, wrong: Wrong) -> Result<(), CoreError> {
         let address = address & !7;
         if wrong == Wrong::Two {
@@ -52,7 +47,6 @@ impl Machine {
     }
 
     /// A register of the core.
-    /// Errors: [`CoreError::Engine`] if the engine refuses.
     pub fn register(&self, register: Register) -> Result<u32, CoreError> {
         self.core.register(register)
     }
@@ -63,7 +57,6 @@ impl Machine {
     }
 
     /// Sets a register of the core.
-    /// Errors: [`CoreError::Engine`] if the engine refuses.
     pub fn set_register(&mut self, register: Register, value: u32) -> Result<(), CoreError> {
         if register == Register::Pc {
             self.pc = value & !1;

@@ -1,7 +1,7 @@
 //! Entry to and return from exceptions.
 
 use super::{Asleep, Machine, frame};
-use crate::core::{Core, CoreError, Register, passes};
+use crate::core::{CoreError, Register, passes};
 use crate::exceptions::number::HARD_FAULT;
 use crate::peripherals::system::Cause;
 

@@ -3,7 +3,8 @@
 //! Source: ARMv7-M Architecture Reference Manual, B1.5.6 to B1.5.8. The floating-point
 //! registers are stacked at once; lazy stacking writes them later to the same addresses.
 
-use crate::core::{Core, CoreError, Register};
+use crate::core::unicorn::UnicornCore;
+use crate::core::{Bus, CoreError, Register};
 
 /// Bytes of a frame without and with floating-point registers.
 const BASIC: u32 = 0x20;
@@ -27,14 +28,17 @@ const SAVED: [Register; 6] =
     [Register::R(0), Register::R(1), Register::R(2), Register::R(3), Register::R(12), Register::Lr];
 
 /// Where the next frame lies: its address and its bytes.
-pub(super) fn next(core: &impl Core) -> Result<(u32, u32), CoreError> {
+pub(super) fn next(core: &UnicornCore<impl Bus + 'static>) -> Result<(u32, u32), CoreError> {
     let float = core.register(Register::Control)? & FLOAT_CONTEXT != 0;
     let bytes = if float { EXTENDED } else { BASIC };
     Ok((core.register(Register::Sp)?.wrapping_sub(bytes) & !7, bytes))
 }
 
 /// Pushes a frame that returns to `back`; false if there is no memory for it.
-pub(super) fn push(core: &mut impl Core, back: u32) -> Result<bool, CoreError> {
+pub(super) fn push(
+    core: &mut UnicornCore<impl Bus + 'static>,
+    back: u32,
+) -> Result<bool, CoreError> {
     let status = core.register(Register::Xpsr)?;
     let float = core.register(Register::Control)? & FLOAT_CONTEXT != 0;
     let stack = core.register(Register::Sp)?;
@@ -59,7 +63,7 @@ pub(super) fn push(core: &mut impl Core, back: u32) -> Result<bool, CoreError> {
 
 /// Enters handler mode for exception `number`; `nested` if another one is active.
 pub(super) fn go_to_handler(
-    core: &mut impl Core,
+    core: &mut UnicornCore<impl Bus + 'static>,
     number: u8,
     nested: bool,
 ) -> Result<(), CoreError> {
@@ -80,7 +84,10 @@ pub(super) fn go_to_handler(
 }
 
 /// Sets the status for the handler of exception `number`.
-pub(super) fn change_handler(core: &mut impl Core, number: u8) -> Result<(), CoreError> {
+pub(super) fn change_handler(
+    core: &mut UnicornCore<impl Bus + 'static>,
+    number: u8,
+) -> Result<(), CoreError> {
     let status = core.register(Register::Xpsr)?;
     let status = status & !(CONDITIONAL | EXCEPTION) | THUMB | u32::from(number);
     // The engine changes to the main stack with the number.
@@ -89,7 +96,10 @@ pub(super) fn change_handler(core: &mut impl Core, number: u8) -> Result<(), Cor
 
 /// Pops the frame of this return value, and restores its mode. Returns the address at which
 /// the program continues; `None` if the frame is not in memory.
-pub(super) fn pop(core: &mut impl Core, value: u32) -> Result<Option<u32>, CoreError> {
+pub(super) fn pop(
+    core: &mut UnicornCore<impl Bus + 'static>,
+    value: u32,
+) -> Result<Option<u32>, CoreError> {
     let float = value & RETURN_BASIC == 0;
     let process = value & RETURN_PROCESS != 0;
     let pointer = if process { Register::Psp } else { Register::Sp };

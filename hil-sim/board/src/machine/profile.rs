@@ -16,9 +16,7 @@ pub struct Poll {
 /// A time: textbook cycles, and the waits of the flash up to then.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Clock {
-    /// Cycles.
     pub cycles: u64,
-    /// Waits.
     pub waits: u64,
 }
 

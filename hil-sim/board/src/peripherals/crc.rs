@@ -25,7 +25,6 @@ const REGISTERS: [Kept; 3] = [
     Kept { offset: POL, reset: 0x04C1_1DB7, mask: u32::MAX },
 ];
 
-/// The unit.
 #[derive(Clone, Debug)]
 pub struct CrcUnit {
     registers: Registers,

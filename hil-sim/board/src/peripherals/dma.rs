@@ -32,7 +32,6 @@ const ERROR: u32 = 1 << 3;
 /// interrupts.
 const ALWAYS: u32 = ENABLE | COMPLETE | HALF | ERROR;
 
-/// A channel.
 #[derive(Clone, Copy, Debug, Default)]
 struct Channel {
     config: u32,
@@ -48,7 +47,6 @@ struct Channel {
 /// A transfer that is due.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Move {
-    /// Channel, from 0.
     pub channel: usize,
     /// From memory to the peripheral, else from the peripheral to memory.
     pub from_memory: bool,

@@ -31,7 +31,6 @@ const REGISTERS: [Kept; 3] = [
 /// What a pin does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Role {
-    /// Input.
     Input,
     /// Output by the program.
     Output,
@@ -71,7 +70,6 @@ impl Gpio {
         Self { registers, driven, levels, locked: 0, locking: (0, 0), broken: None }
     }
 
-    /// What a pin does.
     pub fn role(&self, pin: u32) -> Role {
         match self.registers.get(MODER) >> (2 * pin) & 3 {
             0 => Role::Input,

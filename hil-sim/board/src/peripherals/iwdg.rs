@@ -79,7 +79,6 @@ impl Iwdg {
     }
 
     /// After a reset of the chip: as it came up, with the same oscillator.
-    #[must_use]
     pub fn after_reset(&self) -> Self {
         Self { lsi_hz: self.lsi_hz, ..Self::default() }
     }
@@ -100,7 +99,6 @@ impl Iwdg {
         self.started
     }
 
-    /// Whether it has expired.
     pub const fn has_expired(&self, now: u64) -> bool {
         self.expires <= now
     }

@@ -18,7 +18,6 @@ pub use tick::{Counter, SysTick};
 /// The system control space from 0xE000_E000 on.
 #[derive(Clone, Debug)]
 pub struct System {
-    /// Exceptions.
     pub exceptions: Exceptions,
     /// System control block.
     pub control: Control,

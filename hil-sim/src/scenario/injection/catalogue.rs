@@ -228,7 +228,6 @@ pub const HARDWARE: &[Entry] = {
 };
 
 /// The fault of this kind at this target, if there is one.
-#[must_use]
 pub fn entry(target: Target, kind: Kind) -> Option<&'static Entry> {
     let mut all = CATALOGUE.iter().chain(HARDWARE);
     all.find(|entry| entry.target == target && entry.kind == kind)
@@ -236,8 +235,7 @@ pub fn entry(target: Target, kind: Kind) -> Option<&'static Entry> {
 
 impl Target {
     /// Whether it is hardware of the board, which a run in software lacks.
-    #[must_use]
-    pub fn is_hardware(self) -> bool {
+    pub(crate) fn is_hardware(self) -> bool {
         HARDWARE.iter().any(|entry| entry.target == self)
     }
 }

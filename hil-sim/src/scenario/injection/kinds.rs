@@ -8,9 +8,7 @@ use serde::{Deserialize, Serialize};
 pub enum Target {
     /// Wheel encoder.
     Encoder,
-    /// Preload sensor.
     PreloadSensor,
-    /// Compression sensor.
     CompressionSensor,
     /// Arm angle sensor.
     Angle,
@@ -42,7 +40,6 @@ pub enum Target {
     Commands,
     /// The controller, which starts again.
     Reset,
-    /// Converter of the preload sensor.
     PreloadSensorConverter,
     /// Converter of the compression sensor.
     TreadConverter,
@@ -60,17 +57,13 @@ pub enum Target {
     Interrupt,
     /// The code that the processor executes.
     Processor,
-    /// Task of the wheel encoder.
     WheelEncoderTask,
-    /// Task of the preload sensor.
     PreloadSensorTask,
-    /// Task of the compression sensor.
     CompressionSensorTask,
     /// Task of the angle sensor.
     ArmAngleTask,
     /// Task of the control tick.
     TickTask,
-    /// Task of the model.
     ModelTask,
     /// Task of the log.
     JournalTask,
@@ -78,11 +71,8 @@ pub enum Target {
     LineTask,
     /// The board's supply.
     Supply,
-    /// The reset pin.
     ResetPin,
-    /// A debugger.
     Debugger,
-    /// The host's line.
     HostLine,
     /// The set of parameters in force, in flash.
     StoredSet,
@@ -134,9 +124,7 @@ pub enum Kind {
     Slip,
     /// A sector is soft; a save is cut by a loss of power.
     Torn,
-    /// Is broken.
     Broken,
-    /// Is doubled.
     Doubled,
     /// Is late, so that ticks are lost.
     Overrun,
@@ -164,7 +152,6 @@ pub enum Kind {
     TwoWrongBits,
     /// Halts the core.
     Halted,
-    /// Is shorted.
     Shorted,
 }
 
@@ -178,26 +165,22 @@ fn word(value: impl Serialize) -> String {
 
 impl Target {
     /// Its name in scenarios.
-    #[must_use]
     pub fn name(self) -> String {
         word(self)
     }
 
     /// Whether it is one of the four sensors or the readback of a bridge.
-    #[must_use]
-    pub const fn is_sensor(self) -> bool {
+    pub(crate) const fn is_sensor(self) -> bool {
         use Target::{Angle, CompressionSensor, Encoder, PreloadSensor};
         self.is_readback() || matches!(self, Encoder | PreloadSensor | CompressionSensor | Angle)
     }
 
     /// Whether it is the readback of a bridge or of both.
-    #[must_use]
-    pub const fn is_readback(self) -> bool {
+    pub(crate) const fn is_readback(self) -> bool {
         matches!(self, Self::Readback | Self::DriveReadback | Self::PretightenerReadback)
     }
 
     /// Whether such a fault of it resets the board, at once or by the watchdog.
-    #[must_use]
     pub const fn resets_board(self, kind: Kind) -> bool {
         match self {
             Self::ResetPin | Self::Processor => true,
@@ -208,19 +191,16 @@ impl Target {
     }
 
     /// Whether it is a set of parameters that is read at a start.
-    #[must_use]
     pub const fn is_of_sets(self) -> bool {
         matches!(self, Self::StoredSet | Self::SpareSet | Self::ImageSet | Self::ParameterSave)
     }
 
     /// Whether it is memory that is read at a start.
-    #[must_use]
     pub const fn is_of_start(self) -> bool {
         self.is_of_sets() || matches!(self, Self::OptionBytes)
     }
 
     /// Whether a fault of it changes forces or motion of the plant directly.
-    #[must_use]
     pub const fn moves(self) -> bool {
         use Target::{Drive, Load, Pretightener, Spring, Tread, Wheel};
         matches!(self, Drive | Pretightener | Wheel | Tread | Spring | Load)
@@ -230,14 +210,12 @@ impl Target {
 impl Kind {
     /// Whether a fault of an actuator lies in its bridge or before it, so that the bridge
     /// puts out another duty than it was given. The others lie behind: in motor and gear.
-    #[must_use]
-    pub const fn is_in_bridge(self) -> bool {
+    pub(crate) const fn is_in_bridge(self) -> bool {
         use Kind::{Delayed, Off, Regulating, Reversed, Runaway, Stuck};
         matches!(self, Off | Stuck | Reversed | Delayed | Runaway | Regulating)
     }
 
     /// Its name in scenarios.
-    #[must_use]
     pub fn name(self) -> String {
         word(self)
     }

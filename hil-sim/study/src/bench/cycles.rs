@@ -38,7 +38,6 @@ pub struct Calls {
 /// Textbook Cortex-M4 cycles of calls.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 pub struct Cost {
-    /// Calls.
     pub calls: u64,
     /// Cycles of all calls.
     pub cycles: u64,
@@ -71,16 +70,12 @@ pub struct Firmware {
 /// Cycles with the flash's wait states.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct WithWaits {
-    /// Mean.
     pub mean: f64,
     /// Most.
     pub worst: u64,
 }
 
 /// Starts the emulated core, which is built first if need be.
-///
-/// # Errors
-/// If it cannot be built or does not run.
 pub fn run() -> Result<Measured> {
     #[derive(Deserialize)]
     struct TickCost {
@@ -139,9 +134,6 @@ fn inputs() -> Result<[Vec<Given>; 2]> {
 }
 
 /// Puts the cycles into the variants, once the core's answers agree with the host's.
-///
-/// # Errors
-/// If an answer differs.
 pub fn fill(measured: &[Calls], variants: &mut [Variant]) -> Result<()> {
     let host = on_host()?;
     ensure!(measured.len() == host.len(), "other functions on the core");

@@ -59,9 +59,6 @@ fn rigs() -> impl Iterator<Item = Rig> {
 }
 
 /// The variants in the order of [`VARIANTS`], without cycles.
-///
-/// # Errors
-/// If the shipping model cannot be built.
 pub fn measure() -> Result<Vec<Variant>> {
     let scenes: Vec<(Rig, Vec<Point>)> =
         rigs().map(|rig| (rig.clone(), points(&rig).collect())).collect();

@@ -10,19 +10,14 @@ use crate::figure::{Figure, Panel, Series};
 use crate::figure_svg::svg;
 
 /// The page and its plots: names below `docs`, and texts.
-#[must_use]
 pub fn files(report: &Report) -> Vec<(&'static str, String)> {
-    let mut files = vec![
+    let performance = vec![model_panel(report), plant_panel(report)];
+    let peers = vec![peers_panel(&report.peers)];
+    vec![
         ("PERFORMANCE.md", page(report)),
-        (
-            "figures/performance.svg",
-            svg(&figure("performance", 2, vec![model_panel(report), plant_panel(report)])),
-        ),
-    ];
-    if let Some(peers) = &report.peers {
-        files.push(("figures/peers.svg", svg(&figure("peers", 1, vec![peers_panel(peers)]))));
-    }
-    files
+        ("figures/performance.svg", svg(&figure("performance", 2, performance))),
+        ("figures/peers.svg", svg(&figure("peers", 1, peers))),
+    ]
 }
 
 fn figure(id: &'static str, columns: usize, panels: Vec<Panel>) -> Figure {
@@ -82,13 +77,10 @@ fn peers_panel(peers: &Peers) -> Panel {
 }
 
 /// The tables of a measurement.
-#[must_use]
 pub fn tables(report: &Report) -> String {
-    let mut text = format!("{}{}", model_table(report), plant_table(report));
-    if let Some(peers) = &report.peers {
-        text += &peers_table(peers);
-    }
-    for why in [&report.cycles_left_out, &report.peers_left_out].into_iter().flatten() {
+    let tables = [model_table(report), plant_table(report), peers_table(&report.peers)];
+    let mut text = tables.concat();
+    if let Some(why) = &report.cycles_left_out {
         text += &format!("left out: {why}\n");
     }
     text
@@ -151,8 +143,9 @@ fn peers_table(peers: &Peers) -> String {
 
 fn page(report: &Report) -> String {
     let machine = format!("{} {}", std::env::consts::ARCH, std::env::consts::OS);
-    let mut text = format!(
-        "# Performance\n\nWritten by `cargo rig bench --peers --docs`; do not edit.\n\n\
+    let [scipy, mujoco] = &report.peers.versions;
+    format!(
+        "# Performance\n\nWritten by `cargo rig bench --docs`; do not edit.\n\n\
          Run time against error. Times are processor time of one thread on {machine}, the least of several runs. \
          Cycles are textbook Cortex-M4 cycles of the emulated core, without flash wait states unless they are named. Tests hold errors and cycles.\n\n\
          [![Error against cycles of the reduced model, and against time of the plant](figures/performance.svg)](figures/performance.svg)\n\n\
@@ -164,22 +157,17 @@ fn page(report: &Report) -> String {
          ## Plant\n\n\
          Gap and largest axial force of twelve crossings (three speeds and preloads, pushed and driven, both \
          directions) against the ring with {} times the elements and as small a part of the stride. The error is that \
-         of the worst crossing, the time the mean. Promised are 0.5 % at the default.\n\n```text\n{}```\n",
+         of the worst crossing, the time the mean. Promised are 0.5 % at the default.\n\n```text\n{}```\n\
+         \n## Other solvers\n\n\
+         The published crossing (5 mm/s, 100 N, frictionless, quasi-static) by the plant's *ring*, by {scipy} and by {mujoco}, \
+         as [`run.py`](../hil-sim/study/peers/run.py) stored them. \
+         *LSODA*, *RK23* and *DOP853* solve the ring's own equations with the height eliminated; *Radau* and *BDF* \
+         solve them with a small damper beside the contact, which makes them stiff. The equations are compiled. \
+         MuJoCo's disc has normal springs fitted to the ring at 80 and 120 N, and no memory.\n\n\
+         [![Error against time by method](figures/peers.svg)](figures/peers.svg)\n\n```text\n{}```\n",
         model_table(report),
         report.plant.finer,
         plant_table(report),
-    );
-    if let Some(peers) = &report.peers {
-        let [scipy, mujoco] = &peers.versions;
-        text += &format!(
-            "\n## Other solvers\n\n\
-             The published crossing (5 mm/s, 100 N, frictionless, quasi-static) by the plant's *ring*, by {scipy} and by {mujoco}. \
-             *LSODA*, *RK23* and *DOP853* solve the ring's own equations with the height eliminated; *Radau* and *BDF* \
-             solve them with a small damper beside the contact, which makes them stiff. The equations are compiled. \
-             MuJoCo's disc has normal springs fitted to the ring at 80 and 120 N, and no memory.\n\n\
-             [![Error against time by method](figures/peers.svg)](figures/peers.svg)\n\n```text\n{}```\n",
-            peers_table(peers)
-        );
-    }
-    text
+        peers_table(&report.peers),
+    )
 }

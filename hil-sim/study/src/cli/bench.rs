@@ -16,13 +16,6 @@ use hil_sim::progress;
 /// Times are processor time of one thread.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
-    /// The same crossing by MuJoCo and by SciPy's ODE solvers too.
-    ///
-    /// Needs Python 3 and the network once: they are installed into a virtual
-    /// environment under `target/`. Without them the rest still runs.
-    #[arg(long)]
-    peers: bool,
-
     /// Writes `docs/PERFORMANCE.md` and its plots.
     #[arg(long)]
     docs: bool,
@@ -52,7 +45,7 @@ struct Printed<'a> {
 pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     let report = {
         let spinner = progress::spinner("bench");
-        let options = Options { peers: args.peers, quick: args.quick, cycles: !args.host };
+        let options = Options { quick: args.quick, cycles: !args.host };
         let measured = bench::measure(options, &|what| spinner.say(what));
         measured.map_err(failed)?
     };

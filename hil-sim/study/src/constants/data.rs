@@ -35,15 +35,11 @@ pub struct Row {
 }
 
 /// Where the file is.
-#[must_use]
 pub fn path() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("data/crossings.csv")
 }
 
 /// The ring's answer at a resolution.
-///
-/// # Errors
-/// If no height balances the preload.
 pub fn run(case: &DesignPoint, of: Use, elements: usize, stride_mm: f64) -> Result<Row> {
     let result = cross(&CrossingCase {
         ring: RingParameters::of(&Rig::fe(), elements),
@@ -66,9 +62,6 @@ pub fn run(case: &DesignPoint, of: Use, elements: usize, stride_mm: f64) -> Resu
 }
 
 /// Runs crossings on all cores.
-///
-/// # Errors
-/// As [`run`].
 pub fn run_all(cases: &[(DesignPoint, Use)], progress: &(dyn Fn() + Sync)) -> Result<Vec<Row>> {
     cases
         .par_iter()
@@ -81,7 +74,6 @@ pub fn run_all(cases: &[(DesignPoint, Use)], progress: &(dyn Fn() + Sync)) -> Re
 }
 
 /// The file's text.
-#[must_use]
 pub fn write(rows: &[Row]) -> String {
     let mut text = format!(
         "# Crossings of the ring, {ELEMENTS} elements, {STRIDE_MM} mm a step. Written by \
@@ -101,9 +93,6 @@ pub fn write(rows: &[Row]) -> String {
 }
 
 /// The crossings of a file's text.
-///
-/// # Errors
-/// If a line is not one.
 pub fn read(text: &str) -> Result<Vec<Row>> {
     let mut reader = csv::ReaderBuilder::new().comment(Some(b'#')).from_reader(text.as_bytes());
     reader
@@ -139,7 +128,6 @@ fn row(record: &csv::StringRecord) -> Result<Row> {
 }
 
 /// Name of a kind in file and messages.
-#[must_use]
 pub fn kind_name(kind: Kind) -> &'static str {
     match (kind.direction, kind.driven) {
         (Direction::Deploy, true) => "climb",

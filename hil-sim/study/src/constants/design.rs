@@ -12,7 +12,6 @@ pub struct DesignPoint {
     pub kind: Kind,
     /// Step height, mm.
     pub step_mm: f64,
-    /// Speed, mm/s.
     pub speed_mm_s: f64,
     /// Radial force, N.
     pub preload_n: f64,
@@ -38,7 +37,6 @@ const FIT_UTILISATION: f64 = 1.72;
 const FIT_LOAD_N: f64 = 22.0;
 
 /// Crossings of one kind and use, by default.
-#[must_use]
 pub fn count(kind: Kind, of: Use) -> usize {
     match (of, kind.driven) {
         (Use::Fit, true) => 900,
@@ -51,7 +49,6 @@ pub fn count(kind: Kind, of: Use) -> usize {
 }
 
 /// The crossings of one kind and use, of a wheel with these proportions.
-#[must_use]
 pub fn cases(formula: &Formula, kind: Kind, of: Use) -> Vec<DesignPoint> {
     (0..count(kind, of)).filter_map(|index| case(formula, kind, of, index)).collect()
 }

@@ -24,7 +24,6 @@ const WEIGHTED_UTILISATION: f64 = 1.55;
 const SENSITIVITY: f64 = 5.0;
 
 /// Effective over relaxed stiffness that a crossing of the ring shows.
-#[must_use]
 pub fn observed_stiffness(formula: &Formula, row: &Row) -> f64 {
     let shape = Formula { step_mm: row.case.step_mm, ..*formula };
     let contact = shape.contact(row.gap_mm);
@@ -38,16 +37,12 @@ pub fn observed_stiffness(formula: &Formula, row: &Row) -> f64 {
 }
 
 /// Whether a crossing takes part in the fit.
-#[must_use]
 pub fn takes_part(row: &Row) -> bool {
     row.of != Use::Hold && row.gap_mm > LEAST_GAP_MM && row.utilisation < MOST_UTILISATION
 }
 
 /// Coefficients of a kind in the order of [`Kind::terms`]: weighted least squares of the
 /// relative error of the effective stiffness.
-///
-/// # Errors
-/// If the crossings do not determine them.
 pub fn fit(formula: &Formula, kind: Kind, rows: &[Row]) -> Result<Vec<f64>> {
     let used: Vec<&Row> = rows.iter().filter(|r| r.case.kind == kind && takes_part(r)).collect();
     let terms: Vec<[usize; 4]> = kind.terms().collect();
@@ -94,7 +89,6 @@ fn weight(shape: &Formula, row: &Row, stiffness: f64) -> f64 {
 
 /// Error of the built-in constants' gap at a crossing, in parts of 1 % of the gap or
 /// 10 um, whichever is larger.
-#[must_use]
 pub fn gap_error(formula: &Formula, row: &Row) -> f64 {
     let DesignPoint { kind, step_mm, speed_mm_s, preload_n, load_n } = row.case;
     let shape = Formula { step_mm, ..*formula };

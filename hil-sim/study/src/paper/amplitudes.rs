@@ -55,9 +55,6 @@ pub struct Amplitudes {
 impl Amplitudes {
     /// Theory and simulation without friction, to which the tread is fitted, and the
     /// first transition of the experiments, in the order of the study's cases.
-    ///
-    /// # Errors
-    /// If a crossing cannot be computed.
     pub fn new(experiments: &[&Experiment]) -> Result<Self> {
         let of = |experiment: &&Experiment| {
             let case = &experiment.case;
@@ -93,7 +90,6 @@ impl Amplitudes {
     }
 
     /// Figures 13 and 14: collision force and impact stress.
-    #[must_use]
     pub fn loads_figure(&self) -> Figure {
         let unit = |source| self.values(source, |lift| lift.impact_kpa)[0];
         let ratios = |source| self.values(source, |lift| lift.impact_kpa / unit(source));
@@ -131,7 +127,6 @@ impl Amplitudes {
     }
 
     /// Figures 15 and 16: the vibration amplitude, which is the gap.
-    #[must_use]
     pub fn gap_figure(&self, all: &[Histories]) -> Figure {
         let gap = SOURCES.map(|source| self.series(source, 1.0, |lift| lift.gap_mm)).into_iter();
         let gap = gap.chain([Series::new(Source::Fitted, numbered(AMPLITUDE_MM))]);
@@ -159,7 +154,6 @@ impl Amplitudes {
     }
 
     /// The claims of both.
-    #[must_use]
     pub fn claims(&self, all: &[Histories]) -> Vec<Claim> {
         let of = |figure, id| Claim::of(figure, SECTION, id);
         let goes = |pick: fn(&Lift) -> f64, to: usize, sense: f64| {

@@ -18,7 +18,6 @@ pub enum Loads {
 
 impl Loads {
     /// The rig with these loads.
-    #[must_use]
     pub fn rig(self) -> Rig {
         match self {
             Self::Fe => Rig::fe(),
@@ -30,7 +29,6 @@ impl Loads {
 /// A deployment at constant speed and preload.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Case {
-    /// Loads.
     pub loads: Loads,
     /// Axial speed, mm/s.
     pub speed_mm_s: f64,
@@ -40,19 +38,16 @@ pub struct Case {
 
 impl Case {
     /// A case.
-    #[must_use]
     pub const fn new(loads: Loads, speed_mm_s: f64, preload_n: f64) -> Self {
         Self { loads, speed_mm_s, preload_n }
     }
 
     /// Speed and preload as text.
-    #[must_use]
     pub fn name(&self) -> String {
         format!("{} mm/s, {} N", self.speed_mm_s, self.preload_n)
     }
 
     /// Axial load that this wheel lifts, N.
-    #[must_use]
     pub fn load_n(&self) -> f64 {
         let plant = self.loads.rig().plant;
         plant.top_load_n * plant.top_load_share
@@ -73,7 +68,6 @@ impl Case {
 
     /// Radial force on a wheel that lifts its load from sleeve `level`, N: the preload,
     /// and what the inclined arm makes of the thrust.
-    #[must_use]
     pub fn pressing_n(&self, level: usize) -> f64 {
         let (arm, centre) = self.arm(level);
         self.preload_n + arm.thrust_ratio(centre) * self.load_n()
@@ -81,7 +75,6 @@ impl Case {
 
     /// The deployment of the rig that `seed` draws: this preload and speed
     /// throughout, with room above the preload for its loop.
-    #[must_use]
     pub fn scenario(&self, seed: u64) -> Scenario {
         let mut scenario = Scenario { rig: self.loads.rig(), ..Scenario::default() };
         scenario.preset = if self.loads == Loads::Fe { "fe" } else { "prototype" }.to_owned();
@@ -109,9 +102,6 @@ pub struct Arms {
 
 impl Arms {
     /// The arm of a case.
-    ///
-    /// # Errors
-    /// [`BeamError`] if the arm is out of range.
     pub fn of(case: &Case) -> Result<Self, BeamError> {
         let across = std::array::from_fn(|level| {
             let (arm, centre) = case.arm(level);
@@ -121,21 +111,16 @@ impl Arms {
     }
 
     /// Force across the arm of a collision force from sleeve `level`, N.
-    #[must_use]
     pub fn across_n(&self, level: usize, collision_n: f64) -> f64 {
         self.across[level.min(2)] * collision_n
     }
 
     /// Deflection under a static collision force, mm.
-    #[must_use]
     pub fn static_mm(&self, level: usize, collision_n: f64) -> f64 {
         1e3 * self.arm.compliance_m_per_n() * self.across_n(level, collision_n)
     }
 
     /// Its motion.
-    ///
-    /// # Errors
-    /// [`BeamError`] if the arm is out of range.
     pub fn modal(&self) -> Result<Modal, BeamError> {
         self.arm.modal(MODES)
     }

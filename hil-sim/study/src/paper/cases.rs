@@ -17,13 +17,10 @@ const GONE: f64 = 0.02;
 const NEARLY: f64 = 0.03;
 
 /// The study's four cases.
-#[must_use]
 pub fn cases() -> Vec<Case> {
     CASES.map(|(speed, preload)| Case::new(Loads::Fe, speed, preload)).to_vec()
 }
 
-/// The figure.
-#[must_use]
 pub fn figure(all: &[Histories]) -> Figure {
     let mut panels = panels(all);
     for ((panel, one), force) in panels.iter_mut().zip(all).zip(COLLISION_N) {
@@ -41,7 +38,6 @@ pub fn figure(all: &[Histories]) -> Figure {
 }
 
 /// The claims about it; `all` in the order of [`CASES`].
-#[must_use]
 pub fn claims(all: &[Histories]) -> Vec<Claim> {
     let of = |id| Claim::of("fig11", SECTION, id);
     let [slow, pressed, fast, slowest] = [&all[0], &all[1], &all[2], &all[3]];

@@ -42,7 +42,6 @@ const CHOICE: u64 = 40;
 pub struct Reading {
     /// Gap measured by the controller, mm.
     pub gap_mm: f64,
-    /// True gap, mm.
     pub true_gap_mm: f64,
     /// Tread compression that its sensor shows when the lower wall stops carrying, mm.
     pub depth_mm: f64,
@@ -69,7 +68,6 @@ pub struct Run {
 
 impl Run {
     /// Mean over the crossings of a figure; none if none was completed.
-    #[must_use]
     pub fn mean(&self, figure: impl Fn(&Reading) -> f64) -> Option<f64> {
         let count = self.crossings.len();
         (count > 0).then(|| self.crossings.iter().map(figure).sum::<f64>() / count as f64)
@@ -79,14 +77,12 @@ impl Run {
 /// Forty runs of a case.
 #[derive(Clone, Debug)]
 pub struct Experiment {
-    /// The case.
     pub case: Case,
     /// Its runs, by seed from 1.
     pub runs: Vec<Run>,
 }
 
 /// The runs of each of four means, drawn once for all cases.
-#[must_use]
 pub fn groups() -> Vec<Vec<usize>> {
     let mut all: Vec<usize> = (0..RUNS).collect();
     all.shuffle(&mut ChaCha8Rng::seed_from_u64(CHOICE));
@@ -103,9 +99,6 @@ pub fn marks(x: f64, all: &[f64], series: &mut Series) {
 }
 
 /// Runs every case on forty rigs; `done` is called after each run.
-///
-/// # Errors
-/// If a case makes no controller or a plant fails.
 pub fn run_all(cases: &[Case], done: &(dyn Fn() + Sync)) -> Result<Vec<Experiment>> {
     let pairs: Vec<(Case, u64)> =
         cases.iter().flat_map(|case| (1..=RUNS as u64).map(move |seed| (*case, seed))).collect();
@@ -122,9 +115,6 @@ pub fn run_all(cases: &[Case], done: &(dyn Fn() + Sync)) -> Result<Vec<Experimen
 }
 
 /// One deployment of the rig that `seed` draws.
-///
-/// # Errors
-/// If the case makes no controller or the plant fails.
 pub fn run(case: &Case, seed: u64) -> Result<Run> {
     let scenario = case.scenario(seed);
     let options = Options { speed: Some((case.speed_mm_s, true)), ..Options::default() };

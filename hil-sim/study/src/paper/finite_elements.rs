@@ -12,7 +12,6 @@ const THICKNESS_MM: f64 = 8.0;
 /// What the reference has of a crossing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Crossing {
-    /// Gap, mm.
     pub(super) gap_mm: f64,
     /// Largest axial force until the lower wall is released, N.
     pub(super) collision_n: f64,

@@ -27,14 +27,12 @@ pub struct Peak {
     pub time_s: f64,
     /// Where the wheel is then, mm.
     pub position_mm: f64,
-    /// The value.
     pub value: f64,
 }
 
 /// The histories of one case.
 #[derive(Clone, Debug)]
 pub struct Histories {
-    /// The case.
     pub case: Case,
     /// The reduced model.
     theory: History,
@@ -48,9 +46,6 @@ pub struct Histories {
 
 impl Histories {
     /// Theory and simulation of the experiment's case, and its four means.
-    ///
-    /// # Errors
-    /// If a crossing cannot be computed.
     pub fn new(experiment: &Experiment) -> Result<Self> {
         let case = experiment.case;
         let arms = Arms::of(&case)?;
@@ -70,7 +65,6 @@ impl Histories {
     }
 
     /// Values of a quantity from a source; of the experiment the mean of its means.
-    #[must_use]
     pub fn points(&self, quantity: Quantity, source: Source) -> Points {
         match source {
             Source::Theory => quantity.of(&self.theory).clone(),
@@ -100,7 +94,6 @@ impl Histories {
 
     /// Largest value in each of the three transitions. They are told apart by where the wheel
     /// is: the experiment's is slower than the case while its preload rises.
-    #[must_use]
     pub fn peaks(&self, quantity: Quantity, source: Source) -> [Peak; STAGES] {
         let positions_mm = self.positions_mm(source);
         let points = self.points(quantity, source);
@@ -116,14 +109,12 @@ impl Histories {
     }
 
     /// The largest value of a stage from each source.
-    #[must_use]
     pub fn stage(&self, quantity: Quantity, stage: usize) -> [f64; 3] {
         SOURCES.map(|source| self.peaks(quantity, source)[stage].value)
     }
 
     /// Largest value after the third transition, beyond the largest before the first, over
     /// the largest of all.
-    #[must_use]
     pub fn left_over(&self, quantity: Quantity, source: Source) -> f64 {
         let points = self.points(quantity, source);
         let positions_mm = self.positions_mm(source);
@@ -139,7 +130,6 @@ impl Histories {
     }
 
     /// The quantity as a plot.
-    #[must_use]
     pub fn panel(&self, quantity: Quantity) -> Panel {
         let title = format!("{} {}", ["(a)", "(b)", "(c)"][quantity as usize], self.case.name());
         let means = self.means.iter().map(|mean| quantity.of(mean).clone());
@@ -151,13 +141,11 @@ impl Histories {
 
     /// Clearance from the root of the first step until the centre passes it, theory and
     /// simulation.
-    #[must_use]
     pub fn clearance(&self) -> [Points; 2] {
         [&self.theory, &self.simulation].map(|history| history.clearance_until(f64::INFINITY))
     }
 
     /// The clearance at the first step as a plot.
-    #[must_use]
     pub fn clearance_panel(&self) -> Panel {
         let title = format!("Clearance (Fig. 16): {}", self.case.name());
         let [theory, simulation] =
@@ -171,7 +159,6 @@ impl Histories {
 }
 
 /// All quantities of all cases as plots.
-#[must_use]
 pub fn panels(all: &[Histories]) -> Vec<Panel> {
     let row = |quantity| all.iter().map(move |one| one.panel(quantity));
     Quantity::ALL.into_iter().flat_map(row).collect()
@@ -192,7 +179,6 @@ fn thin(points: &[(f64, f64)]) -> Points {
 }
 
 /// Where the wheel has left each of the steps behind, mm.
-#[must_use]
 pub fn stage_ends_mm(case: &Case) -> [f64; STAGES] {
     let steps = case.loads.rig().rig.step_positions_mm;
     std::array::from_fn(|stage| steps[stage] + LEFT_MM)

@@ -104,7 +104,6 @@ impl Quantity {
     pub const ALL: [Self; 3] = [Self::Collision, Self::Impact, Self::Vibration];
 
     /// Name and unit.
-    #[must_use]
     pub const fn axis(self) -> &'static str {
         ["collision, N", "impact, kPa", "vibration, µm"][self as usize]
     }

@@ -54,16 +54,11 @@ pub struct Hold {
 }
 
 impl Hold {
-    /// The cases.
-    #[must_use]
     pub fn cases() -> Vec<Case> {
         CASES.map(|(speed, preload)| Case::new(Loads::Prototype, speed, preload)).to_vec()
     }
 
     /// Theory and simulation, and the experiments on [`Hold::cases`].
-    ///
-    /// # Errors
-    /// If a crossing cannot be computed.
     pub fn new(experiments: &[&Experiment]) -> Result<Self> {
         let case = |index: usize| Case::new(Loads::Prototype, CASES[index].0, CASES[index].1);
         let simulated = |case: &Case| simulation::lift(case, Drive::Driven, 1).map(|l| l.gap_mm);
@@ -103,8 +98,6 @@ impl Hold {
         })
     }
 
-    /// The figure.
-    #[must_use]
     pub fn figure(&self) -> Figure {
         let preload = vec![
             Series::new(Source::Theory, self.preload.0.clone()),
@@ -136,7 +129,6 @@ impl Hold {
     }
 
     /// The claims. `all` are all experiments at rig loads.
-    #[must_use]
     pub fn claims(&self, all: &[&Experiment], speed: &Sweep) -> Vec<Claim> {
         let of = |section, id| Claim::of("conclusion", section, id);
         let apart = |index: usize| self.gaps.map(|gaps| gaps[index] / gaps[0] - 1.0);

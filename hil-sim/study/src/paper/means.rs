@@ -27,7 +27,6 @@ impl Means {
     ///
     /// Rigs that lack a reading are fitted without it; one with fewer than three is left
     /// out.
-    #[must_use]
     pub fn of(
         sweep: &[&Experiment],
         x: impl Fn(&Experiment) -> f64,
@@ -63,7 +62,6 @@ impl Means {
     }
 
     /// Mean of the four means.
-    #[must_use]
     pub fn middle(&self) -> Vec<f64> {
         let count = self.curves.len() as f64;
         (0..self.at.len())
@@ -72,34 +70,29 @@ impl Means {
     }
 
     /// Largest difference between two of the means at one place.
-    #[must_use]
     pub fn spread(&self) -> f64 {
         let ranges = (0..self.at.len()).filter_map(|i| extent(self.curves.iter().map(|c| c[i])));
         ranges.map(|(low, high)| high - low).fold(0.0, f64::max)
     }
 
     /// Rise from the first place to the last, of the mean of means.
-    #[must_use]
     pub fn rise(&self) -> f64 {
         let middle = self.middle();
         middle[middle.len() - 1] - middle[0]
     }
 
     /// [`bend`] of each mean.
-    #[must_use]
     pub fn bends(&self) -> Vec<f64> {
         self.curves.iter().map(|curve| bend(curve)).collect()
     }
 
     /// Whether every mean changes with the same sign from each place to the next: up for a
     /// positive `sense`.
-    #[must_use]
     pub fn all_go(&self, sense: f64) -> bool {
         self.curves.iter().all(|curve| curve.windows(2).all(|w| sense * (w[1] - w[0]) > 0.0))
     }
 
     /// The means as series, the first with the range over all rigs.
-    #[must_use]
     pub fn series(&self) -> Vec<Series> {
         let band = self.at.iter().zip(&self.range).map(|(&x, &(low, high))| (x, low, high));
         let mut range: Vec<_> = band.collect();
@@ -115,7 +108,6 @@ impl Means {
 
 /// Largest distance of evenly spaced values from the straight line between their ends,
 /// over the distance between these: 0 for a line, positive above it.
-#[must_use]
 pub fn bend(values: &[f64]) -> f64 {
     let last = values.len() - 1;
     let rise = values[last] - values[0];

@@ -14,7 +14,6 @@ const LEAVES_MM: f64 = 8.0;
 
 /// Rolling resistance over radial force of this plant on the continuous wall at this
 /// speed, mm/s, and pressing force, N.
-#[must_use]
 pub fn resistance(plant: &VirtualRig, speed_mm_s: f64, pressing_n: f64) -> f64 {
     let ring = &plant.parameters().ring;
     let guess = ring.radius_mm - 0.3;
@@ -24,7 +23,6 @@ pub fn resistance(plant: &VirtualRig, speed_mm_s: f64, pressing_n: f64) -> f64 {
 
 /// Collision force, N, beyond this [`resistance`], within the inertia of the carriage,
 /// 0.3 N, as long as the wheel grips; 0 where the wheel has not yet touched the step ahead.
-#[must_use]
 pub fn collision_n(plant: &VirtualRig, resistance: f64) -> f64 {
     let (truth, parameters) = (plant.truth(), plant.parameters());
     let used = truth.utilisation;
@@ -45,7 +43,6 @@ pub fn collision_n(plant: &VirtualRig, resistance: f64) -> f64 {
 
 /// Mean stress that this collision force puts on the wheel, kPa (1e-3 N/mm^2): the force
 /// over the part of the wheel's undeformed surface that the step cuts off.
-#[must_use]
 pub fn impact_kpa(plant: &VirtualRig, collision_n: f64) -> f64 {
     let (truth, parameters) = (plant.truth(), plant.parameters());
     let local = parameters.wall.local(truth.position_mm);
@@ -60,7 +57,6 @@ pub fn impact_kpa(plant: &VirtualRig, collision_n: f64) -> f64 {
 }
 
 /// Force over area, kPa; 0 where nothing touches.
-#[must_use]
 pub fn stress_kpa(force_n: f64, area_mm2: f64) -> f64 {
     if area_mm2 > 0.0 { 1e3 * force_n / area_mm2 } else { 0.0 }
 }
@@ -72,7 +68,6 @@ pub fn stress_kpa(force_n: f64, area_mm2: f64) -> f64 {
 /// centre has passed it, and u the height of the centre above the top, both mm. Range: 0
 /// where the corner is ahead of the wheel; the entire patch where it lies behind.
 /// Memory lets the trailing part of the patch go earlier: the true area is smaller.
-#[must_use]
 pub fn corner_area_mm2((radius, width): (f64, f64), ahead_mm: f64, above_mm: f64) -> f64 {
     let half = (above_mm / radius).clamp(-1.0, 1.0).acos();
     let start = (ahead_mm / radius).clamp(-1.0, 1.0).asin().max(-half);

@@ -35,9 +35,6 @@ pub struct Modes {
 
 impl Modes {
     /// Modes of the drive arm.
-    ///
-    /// # Errors
-    /// [`BeamError`] if the arm refuses.
     pub fn new() -> Result<Self, BeamError> {
         let beam = Beam::drive_arm();
         let tip_mass_kg = beam.tip_mass_for(CONSTRAINED_HZ)?;
@@ -62,8 +59,6 @@ impl Modes {
         Ok(Self { beam, tip_mass_kg, constrained, free, shapes, bare_hz })
     }
 
-    /// The figure.
-    #[must_use]
     pub fn figure(&self) -> Figure {
         let of = |source, index: usize| {
             Series::new(source, vec![(0.0, self.constrained[index].1), (1.0, self.free[index].1)])
@@ -124,7 +119,6 @@ impl Modes {
     }
 
     /// The claims about it; `ripple_hz` excites the arm between these speeds of the study.
-    #[must_use]
     pub fn claims(&self, ripple_hz: (f64, f64)) -> Vec<Claim> {
         let of = |id| Claim::of("fig19", SECTION, id);
         let (constrained, free) = (self.constrained[1].1, self.free[1].1);

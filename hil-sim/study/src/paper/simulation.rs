@@ -30,9 +30,6 @@ const QUIET_S: f64 = 1e-3;
 ///
 /// The area is the part of the wheel that the step cuts off, as a compression sensor
 /// would have it: elements of the ring enter and leave as a whole.
-///
-/// # Errors
-/// [`BalanceError`] if no height of the centre balances the preload.
 pub fn lift(case: &Case, drive: Drive, level: usize) -> Result<Lift, BalanceError> {
     let rig = case.loads.rig();
     let (axial, preload_n) = match drive {
@@ -66,9 +63,6 @@ const CELLS: usize = 4;
 /// A deployment of the driven wheel by the reference models, a crossing a step: the
 /// ring with memory and inertia, the waves that its stress sends through the tread, and the
 /// arm that it bends.
-///
-/// # Errors
-/// If the preload cannot be carried or the arm is out of range.
 pub fn deployment(case: &Case, arms: &Arms) -> Result<History> {
     let rig = case.loads.rig();
     let size = (rig.rig.wheel_radius_mm, rig.rig.wheel_width_mm);

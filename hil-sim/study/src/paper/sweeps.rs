@@ -39,8 +39,6 @@ pub enum Variable {
 }
 
 impl Variable {
-    /// The case at this value.
-    #[must_use]
     pub fn case(self, value: f64) -> Case {
         match self {
             Self::Preload => Case::new(Loads::Prototype, SPEED_MM_S, value),
@@ -49,7 +47,6 @@ impl Variable {
     }
 
     /// Cases of the experiment.
-    #[must_use]
     pub fn cases(self) -> Vec<Case> {
         let values = match self {
             Self::Preload => PRELOADS_N,
@@ -93,12 +90,10 @@ pub struct Curves {
     pub experiment: Means,
 }
 
-/// A sweep.
 #[derive(Clone, Debug)]
 pub struct Sweep {
     /// What is swept.
     pub variable: Variable,
-    /// Gap, mm.
     pub gap: Curves,
     /// True gap of the plant instead of the measured one, mm.
     pub true_gap: Means,
@@ -112,9 +107,6 @@ pub struct Sweep {
 
 impl Sweep {
     /// Theory, simulation, and what the experiments on [`Variable::cases`] gave.
-    ///
-    /// # Errors
-    /// [`BalanceError`] if a crossing of the ring cannot be balanced.
     pub fn new(variable: Variable, experiments: &[&Experiment]) -> Result<Self, BalanceError> {
         let cases = variable.cases();
         let (from, to) = (variable.of(&cases[0]), variable.of(&cases[cases.len() - 1]));
@@ -153,8 +145,6 @@ impl Sweep {
         })
     }
 
-    /// Figure 20 or 21.
-    #[must_use]
     pub fn gap_figure(&self) -> Figure {
         let (id, title, published) = match self.variable {
             Variable::Preload => ("fig20", "Contact gap against preload", GAP_SPREAD_MM.0),
@@ -167,8 +157,6 @@ impl Sweep {
         self.figure(id, title, panels, vec![spread_mark("gap", "mm", published, &self.gap)])
     }
 
-    /// Figure 22 or 23.
-    #[must_use]
     pub fn depth_figure(&self) -> Figure {
         let (preload, speed) = (
             ("fig22", "Embedding depth and contact area against preload"),

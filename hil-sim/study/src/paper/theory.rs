@@ -25,7 +25,6 @@ pub enum Drive {
 /// Figures of a crossing at the instant at which the lower wall stops carrying.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Lift {
-    /// Gap, mm.
     pub gap_mm: f64,
     /// Tread depth at the corner, mm.
     pub depth_mm: f64,
@@ -38,7 +37,6 @@ pub struct Lift {
 }
 
 /// The reduced model's crossing from sleeve `level`.
-#[must_use]
 pub fn lift(case: &Case, drive: Drive, level: usize) -> Lift {
     let formula = Formula::new(&case.loads.rig());
     let (force, load) = match drive {
@@ -59,7 +57,6 @@ pub fn lift(case: &Case, drive: Drive, level: usize) -> Lift {
 }
 
 /// The same, mean over the three stages.
-#[must_use]
 pub fn mean_lift(case: &Case, drive: Drive) -> Lift {
     let all: Vec<Lift> = (0..3).map(|level| lift(case, drive, level)).collect();
     let mean = |figure: fn(&Lift) -> f64| all.iter().map(figure).sum::<f64>() / 3.0;
@@ -80,7 +77,6 @@ fn area_of_gap_mm2(formula: &Formula, gap_mm: f64) -> f64 {
 
 /// Contact area that belongs to a tread depth at lift-off, mm^2, by the nominal
 /// geometry: how a compression sensor's reading becomes an area.
-#[must_use]
 pub fn area_of_depth_mm2(case: &Case, depth_mm: f64) -> f64 {
     let formula = Formula::new(&case.loads.rig());
     let above = formula.radius_mm - formula.step_mm;
@@ -94,9 +90,6 @@ const COARSE: (usize, f64) = (1440, 0.02);
 
 /// A deployment of the driven wheel as the reduced model has it: an elastic ring of the
 /// stiffness that is effective at lift-off, and an arm that bends as under a static force.
-///
-/// # Errors
-/// [`BalanceError`] if no height of the centre balances the preload.
 pub fn deployment(case: &Case, arms: &Arms) -> Result<History, BalanceError> {
     let rig = case.loads.rig();
     let formula = Formula::new(&rig);

@@ -20,13 +20,10 @@ const FIRST_BEFORE_S: f64 = 2.0;
 const AT_2_S: (f64, f64) = (1.9, 2.1);
 
 /// The cases of the figure.
-#[must_use]
 pub fn cases() -> Vec<Case> {
     CASES.map(|(speed, preload)| Case::new(Loads::Prototype, speed, preload)).to_vec()
 }
 
-/// The figure.
-#[must_use]
 pub fn figure(all: &[Histories]) -> Figure {
     let caption = "Three transitions at rig loads (20 N on top, of which this wheel lifts a \
                    third). (a) Collision: axial force of the contact against the motion, beyond \
@@ -60,7 +57,6 @@ pub(super) fn fall(one: &Histories, quantity: Quantity) -> bool {
 }
 
 /// The claims about it; `all` in the order of [`CASES`].
-#[must_use]
 pub fn claims(all: &[Histories]) -> Vec<Claim> {
     let of = |id| Claim::of("fig24", SECTION, id);
     let shapes = Quantity::ALL.map(|quantity| {

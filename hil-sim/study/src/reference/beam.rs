@@ -110,7 +110,6 @@ impl Beam {
     /// Published: length, section 12 x 15 mm, alloy 2A12 (density 2780 kg/m^3, modulus
     /// 70 to 73 GPa by the source; 72.5 taken). Not published: which side of the
     /// section lies in that plane. Chosen: the 15 mm one, as one would mount it.
-    #[must_use]
     pub fn drive_arm() -> Self {
         Self {
             length_m: Rig::prototype().rig.arm_length_mm * 1e-3,
@@ -122,13 +121,11 @@ impl Beam {
     }
 
     /// Mass of the beam, kg.
-    #[must_use]
     pub fn mass_kg(&self) -> f64 {
         self.rho_kg_m3 * self.width_m * self.height_m * self.length_m
     }
 
     /// Bending stiffness EI, N m^2, with I = width height^3 / 12.
-    #[must_use]
     pub fn bending_stiffness_n_m2(&self) -> f64 {
         self.e_pa * self.width_m * self.height_m.powi(3) / 12.0
     }
@@ -145,9 +142,6 @@ impl Beam {
     /// Cost: three bisections to the last bit a mode.
     /// Source: the study, eqs 41-54; classical roots in R. D. Blevins, "Formulas for
     /// Natural Frequency and Mode Shape", table 8-1.
-    ///
-    /// # Errors
-    /// [`BeamError`] names the argument that is not in its range.
     pub fn modes(&self, ends: Ends, tip: Tip, count: usize) -> Result<Vec<Mode>, BeamError> {
         let (mass, spring) = self.ratios(tip)?;
         require("count", count as f64, (1..=MAX_COUNT).contains(&count), || {
@@ -169,9 +163,6 @@ impl Beam {
     /// The published first constrained mode of the rig, 276 Hz, takes 62.9 g on
     /// [`Self::drive_arm`] (bare: 588.5 Hz). That is an equivalent mass, not a weighed one:
     /// it represents wheel and axle, and whatever yields in the clamp.
-    ///
-    /// # Errors
-    /// [`BeamError`] if no mass in range gives that frequency.
     pub fn tip_mass_for(&self, frequency_hz: f64) -> Result<f64, BeamError> {
         let first = |mass| self.mode(roots::first(End::Clamped, mass, 0.0, 1)[0]).frequency_hz;
         let (bare_hz, least_hz) = (first(0.0), first(MAX_MASS_RATIO));

@@ -41,53 +41,45 @@ pub struct ReferenceCase {
 
 impl ReferenceCase {
     /// A frictionless crossing of the rig's own step.
-    #[must_use]
     pub fn new(rig: Rig, speed_mm_s: f64, preload_n: f64) -> Self {
         let resolution = Resolution::HISTORY;
         Self { rig, speed_mm_s, preload_n, axial: Axial::Pushed, resolution }
     }
 
     /// The first case of the study, at its top load of 60 N: 5 mm/s, 100 N.
-    #[must_use]
     pub fn first() -> Self {
         Self::new(Rig::fe(), 5.0, 100.0)
     }
 
     /// The same crossing, driven by torque against this wheel's share of the top load.
-    #[must_use]
     pub fn driven(self) -> Self {
         let load_n = self.rig.plant.top_load_n * self.rig.plant.top_load_share;
         Self { axial: Axial::Driven(load_n), ..self }
     }
 
     /// Wheel and tread as a ring.
-    #[must_use]
     pub fn ring(&self) -> RingParameters {
         RingParameters::of(&self.rig, self.resolution.elements)
     }
 
     /// Radial load and how the wheel is moved.
-    #[must_use]
     pub fn balance(&self) -> Balance {
         let (preload_n, axial) = (self.preload_n, self.axial);
         Balance { preload_n, spring_n_per_mm: 0.0, arm_n: 0.0, axial }
     }
 
     /// Stiffness of the tread at once, per area, Pa/m: k_0.
-    #[must_use]
     pub fn instant_pa_per_m(&self) -> f64 {
         self.rig.tread.k_inf_pa_per_m * self.rig.tread.stiffening
     }
 
     /// Angle between the wall and the path of a rigid wheel that touches the corner,
     /// rad: `cos phi = (R - h) / R`.
-    #[must_use]
     pub fn climb_angle(&self) -> f64 {
         (1.0 - self.rig.rig.step_height_mm / self.rig.rig.wheel_radius_mm).acos()
     }
 
     /// Speed at which tread and corner close along their normal, mm/s: `v sin phi`.
-    #[must_use]
     pub fn closing_speed_mm_s(&self) -> f64 {
         self.speed_mm_s * self.climb_angle().sin()
     }

@@ -55,7 +55,6 @@ pub struct Crossing {
 
 impl Crossing {
     /// Largest force against the motion, N.
-    #[must_use]
     pub fn peak_n(&self) -> f64 {
         self.samples.iter().map(|sample| sample.axial_n).fold(0.0, f64::max)
     }
@@ -71,9 +70,6 @@ impl Crossing {
 /// `(omega dt)^2/12`, 0.2 % at 0.2 ms and 800 rad/s.
 /// Cost: some 10^4 steps of a few hundred elements.
 /// Source: derived; as the mass or the speed falls it becomes the quasi-static crossing.
-///
-/// # Errors
-/// [`BalanceError`] if the preload cannot be carried before the step.
 pub fn dynamic(case: &ReferenceCase) -> Result<Crossing, BalanceError> {
     let radius = case.rig.rig.wheel_radius_mm;
     let height = case.rig.rig.step_height_mm;

@@ -43,7 +43,6 @@ pub struct Rod {
 impl Rod {
     /// A rod at rest, of `length_m` in `cells`, two at least, against a hub that sends back
     /// `hub` of the pressure that arrives: `(Z_hub - Z)/(Z_hub + Z)`, -1 to 1.
-    #[must_use]
     pub fn new(rubber: Rubber, length_m: f64, cells: usize, hub: f64) -> Self {
         let dt_s = length_m / cells as f64 / rubber.front_speed_m_s();
         Self {
@@ -60,7 +59,6 @@ impl Rod {
 
     /// The tread at rest on a hub of the arm's alloy, in `cells`. That has a hundred times
     /// the impedance of rubber and sends back 0.98 of a wave.
-    #[must_use]
     pub fn tread(rubber: Rubber, cells: usize) -> Self {
         let alloy = Beam::drive_arm();
         let hub = (alloy.e_pa * alloy.rho_kg_m3).sqrt();
@@ -69,19 +67,16 @@ impl Rod {
     }
 
     /// Length of a step, s: that in which the front crosses a cell.
-    #[must_use]
     pub fn step_s(&self) -> f64 {
         self.dt_s
     }
 
     /// Pressure on the hub, Pa, in the step just taken.
-    #[must_use]
     pub fn hub_pa(&self) -> f64 {
         self.hub_pa
     }
 
     /// Pressure in a cell, Pa: P + Q of (35).
-    #[must_use]
     pub fn pressure_pa(&self, cell: usize) -> f64 {
         self.inward[cell] + self.outward[cell]
     }
@@ -140,7 +135,6 @@ impl Rod {
 ///
 /// The stress at the hub is that on the face a transit before, to some thousandths of its
 /// peak.
-#[must_use]
 pub fn stress(case: &ReferenceCase, crossing: &Crossing) -> Vec<(f64, f64)> {
     let mut rod = Rod::tread(Rubber::of(case), CELLS);
     let first_s = crossing.samples[0].t_s;

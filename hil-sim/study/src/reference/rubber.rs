@@ -27,13 +27,11 @@ pub struct Rubber {
     pub instant_pa: f64,
     /// Relaxation time at held strain, s: p_1.
     pub tau_s: f64,
-    /// Density, kg/m^3.
     pub density_kg_m3: f64,
 }
 
 impl Rubber {
     /// The fitted tread: its stiffness per area times its thickness.
-    #[must_use]
     pub fn of(case: &ReferenceCase) -> Self {
         let thick_m = THICKNESS_MM * 1e-3;
         Self {
@@ -49,7 +47,6 @@ impl Rubber {
     ///
     /// Equation: `tan delta = (s - 1)/(2 sqrt s)` at `omega p_1 = 1/sqrt s`, s = E_2/q_0.
     /// Range: both above 0.
-    #[must_use]
     pub fn of_sheets(loss_tangent: f64, at_hz: f64) -> Self {
         let root = loss_tangent + loss_tangent.hypot(1.0);
         Self {
@@ -61,26 +58,22 @@ impl Rubber {
     }
 
     /// Speed of the front of a wave, m/s: `sqrt(E_2/rho)`.
-    #[must_use]
     pub fn front_speed_m_s(&self) -> f64 {
         (self.instant_pa / self.density_kg_m3).sqrt()
     }
 
     /// Speed of a slow wave, m/s: `sqrt(q_0/rho)`.
-    #[must_use]
     pub fn slow_speed_m_s(&self) -> f64 {
         (self.relaxed_pa / self.density_kg_m3).sqrt()
     }
 
     /// Impedance of the front, Pa s/m: `rho c`; Z of (35) per area.
-    #[must_use]
     pub fn impedance(&self) -> f64 {
         self.density_kg_m3 * self.front_speed_m_s()
     }
 
     /// Largest attenuation of any wave, dB, over `travel_m`: that of the front,
     /// `(1 - q_0/E_2)/(2 p_1 c)` Np/m, c the speed of the front.
-    #[must_use]
     pub fn loss_db(&self, travel_m: f64) -> f64 {
         let relaxing = (self.instant_pa - self.relaxed_pa) / self.instant_pa;
         let front_np_m = relaxing / (2.0 * self.tau_s * self.front_speed_m_s());

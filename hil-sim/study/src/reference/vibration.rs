@@ -43,7 +43,6 @@ pub struct Arm {
     pub tip: Tip,
     /// Angle between arm and pillar, rad, with the wheel on the outermost wall.
     pub angle_rad: f64,
-    /// Loss factor.
     pub loss_factor: f64,
 }
 
@@ -57,9 +56,6 @@ impl Arm {
     /// the first elastic one without (Rayleigh), and 163 Hz is below 276. The free rig
     /// therefore bends elsewhere first, in a part that its base holds when it is bolted
     /// down, of which nothing is published.
-    ///
-    /// # Errors
-    /// [`BeamError`] if no mass gives that frequency.
     pub fn of(rig: &Rig) -> Result<Self, BeamError> {
         let beam = Beam::drive_arm();
         let mass_kg = beam.tip_mass_for(CONSTRAINED_HZ)?;
@@ -73,7 +69,6 @@ impl Arm {
 
     /// The arm with the tread as a spring to the wall: stiffness per area at once times the
     /// patch, mm^2, by its part across the arm.
-    #[must_use]
     pub fn on_tread(self, case: &ReferenceCase, patch_mm2: f64) -> Self {
         let radial = case.instant_pa_per_m() * patch_mm2 * 1e-6;
         let spring_n_per_m = radial * self.angle_rad.cos().powi(2);
@@ -81,16 +76,12 @@ impl Arm {
     }
 
     /// Frequencies of its first `count` modes, Hz.
-    ///
-    /// # Errors
-    /// [`BeamError`] if `count` is out of range.
     pub fn frequencies_hz(&self, count: usize) -> Result<Vec<f64>, BeamError> {
         let modes = self.beam.modes(Ends::ClampedFree, self.tip, count)?;
         Ok(modes.iter().map(|mode| mode.frequency_hz).collect())
     }
 
     /// Deflection at the tip per static force there, m/N: `L^3/(3 EI)`, and the spring.
-    #[must_use]
     pub fn compliance_m_per_n(&self) -> f64 {
         let bending = 3.0 * self.beam.bending_stiffness_n_m2() / self.beam.length_m.powi(3);
         1.0 / (bending + self.tip.spring_n_per_m)
@@ -101,9 +92,6 @@ impl Arm {
     }
 
     /// Its motion at the tip by its first `count` modes.
-    ///
-    /// # Errors
-    /// [`BeamError`] if `count` is out of range.
     pub fn modal(&self, count: usize) -> Result<Modal, BeamError> {
         Ok(Modal::new(&self.shapes(count)?, 0.5 * self.loss_factor, self.compliance_m_per_n()))
     }
@@ -114,9 +102,6 @@ impl Arm {
     /// the loss factor, and the static deflection of the modes left out; (56) has the
     /// amplitude of a normalised mode, which has none. Without a spring at the tip.
     /// Range: frequencies up to a few modes. Error: 1e-6 below 600 Hz.
-    ///
-    /// # Errors
-    /// [`BeamError`] if the arm is out of range.
     pub fn receptance_m_per_n(&self, frequency_hz: f64) -> Result<Complex<f64>, BeamError> {
         let loss = Complex::new(1.0, self.loss_factor);
         let square = (TAU * frequency_hz).powi(2);
@@ -190,14 +175,12 @@ impl Modal {
     }
 
     /// Deflection of the tip, m.
-    #[must_use]
     pub fn deflection_m(&self) -> f64 {
         let modes: f64 = self.oscillators.iter().map(|o| o.gain * o.state.0).sum();
         modes + self.rest_compliance * self.force_n
     }
 
     /// Deflection beyond the static one of the same force, m.
-    #[must_use]
     pub fn vibration_m(&self) -> f64 {
         self.deflection_m() - self.compliance * self.force_n
     }
@@ -233,9 +216,6 @@ pub struct Bending {
 /// Deflection at the wheel across the arm under what the crossing adds to the force of
 /// steady rolling: the collision force and what accelerates the wheel radially, each by
 /// its part across the inclined arm.
-///
-/// # Errors
-/// [`BeamError`] if the arm is out of range.
 pub fn bending(case: &ReferenceCase, crossing: &Crossing) -> Result<Vec<Bending>, BeamError> {
     let arm = Arm::of(&case.rig)?;
     let rolling: Vec<f64> =

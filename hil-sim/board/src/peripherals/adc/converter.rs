@@ -57,7 +57,6 @@ const REGISTERS: [Kept; 14] = [
     Kept { offset: 0xB4, reset: 0, mask: 0x007F_007F },
 ];
 
-/// One converter.
 #[derive(Clone, Debug)]
 pub(super) struct Converter {
     pub(super) registers: Registers,

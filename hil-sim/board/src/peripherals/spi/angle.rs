@@ -38,7 +38,6 @@ const FASTEST: u64 = 17;
 /// Frame on an open line with its pull-up.
 const PULLED_UP: u16 = 0xFFFF;
 
-/// The sensor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct AngleSensor {
     /// The frame of the present angle, with parity and flag.

@@ -71,7 +71,6 @@ fn spread(
 }
 
 /// Claims about the sweep over the preload: figures 20 and 22.
-#[must_use]
 pub fn preload_claims(sweep: &Sweep) -> Vec<Claim> {
     let of = |figure, id| Claim::of(figure, SECTION, id);
     let (gap, depth, area) = (&sweep.gap, &sweep.depth, &sweep.area);
@@ -134,7 +133,6 @@ pub fn preload_claims(sweep: &Sweep) -> Vec<Claim> {
 }
 
 /// Claims about the sweep over the speed: figures 21 and 23.
-#[must_use]
 pub fn speed_claims(sweep: &Sweep, preload: &Sweep) -> Vec<Claim> {
     let of = |figure, id| Claim::of(figure, SECTION, id);
     let (gap, depth, area) = (&sweep.gap, &sweep.depth, &sweep.area);

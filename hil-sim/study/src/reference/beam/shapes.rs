@@ -15,7 +15,6 @@ const PIECES: usize = 4096;
 /// One mode's shape, of unit modal mass and with its tip on the positive side.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Shape {
-    /// The mode.
     pub mode: Mode,
     length_m: f64,
     /// Wave leaving end A, wave leaving end B.
@@ -29,7 +28,6 @@ impl Shape {
     /// Equation: `W(x) = [1 1] f(x) xi_A^+ + [1 1] f(L - x) eta_B^-` (55).
     /// Range: 0 to the length. Error: 1e-8 of the largest deflection while
     /// `beta_l > 0.1`; a soft spring's rigid mode below that cancels the more.
-    #[must_use]
     pub fn at(&self, x_m: f64) -> f64 {
         let part = x_m / self.length_m;
         let beta_l = self.mode.beta_l;
@@ -39,7 +37,6 @@ impl Shape {
     }
 
     /// Deflection at end B, 1/sqrt(kg).
-    #[must_use]
     pub fn tip(&self) -> f64 {
         self.at(self.length_m)
     }
@@ -55,9 +52,6 @@ impl Beam {
     ///
     /// Equation: `xi_A^+` is what `R_A f R_B f` leaves as it is (53),
     /// `eta_B^- = R_B f xi_A^+`; scaled to `int rho A W^2 dx + m W(L)^2 = 1`.
-    ///
-    /// # Errors
-    /// As [`Self::modes`].
     pub fn shapes(&self, ends: Ends, tip: Tip, count: usize) -> Result<Vec<Shape>, BeamError> {
         let modes = self.modes(ends, tip, count)?;
         let (mass, spring) = self.ratios(tip)?;

@@ -35,7 +35,6 @@ pub enum End {
 
 impl End {
     /// Reflection matrix R of this end, the same at either end of the beam (eqs 48-54).
-    #[must_use]
     pub fn reflection(self) -> Transfer {
         match self {
             Self::Clamped => Transfer::new(-I, c(-1.0, -1.0), c(-1.0, 1.0), I),
@@ -80,7 +79,6 @@ impl Load {
     ///
     /// Units: `mass` in beam masses (`m / rho A L`), `spring` in `EI / L^3`.
     /// Range: finite, `beta_l > 0`.
-    #[must_use]
     pub fn mass_and_spring(mass: f64, spring: f64, beta_l: f64) -> Self {
         let z = spring / beta_l.powi(3) - mass * beta_l;
         let norm = z.hypot(1.0);
@@ -94,7 +92,6 @@ impl Load {
     /// `R = [[2z - (1+i), 2], [-2i, 2z + (1+i)]] / ((1-i) - 2z)`.
     /// [`End::Free`] at z = 0, [`End::Pinned`] as |z| grows. The denominator has no
     /// real zero.
-    #[must_use]
     pub fn reflection(self) -> Transfer {
         let (q, p) = (self.shear, 2.0 * self.deflection);
         let numerator = Transfer::new(c(p - q, -q), c(2.0 * q, 0.0), c(0.0, -2.0 * q), c(p + q, q));
@@ -108,7 +105,6 @@ impl Load {
 }
 
 /// Propagation matrix over the beam, `f(L)` (eq 44).
-#[must_use]
 pub fn propagation(beta_l: f64) -> Transfer {
     Transfer::new(
         Complex::from_polar(1.0, -beta_l),
@@ -132,7 +128,6 @@ pub fn propagation(beta_l: f64) -> Transfer {
 /// Range: `beta_l > 0`; nothing overflows, the exponentials only fall.
 /// Error: a few units of rounding of a number of order one.
 /// Cost: three products and one determinant of 2 x 2 complex matrices.
-#[must_use]
 pub fn frequency_function(a: End, b: Load, beta_l: f64) -> f64 {
     let f = propagation(beta_l);
     let round_trip = a.reflection() * f * b.reflection() * f;

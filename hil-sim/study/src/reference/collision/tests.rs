@@ -16,11 +16,9 @@ use hil_sim::plant::crossing::{CrossingCase, CrossingResult, cross};
 struct Elastic {
     /// Undeformed radius, mm.
     radius_mm: f64,
-    /// Width, mm.
     width_mm: f64,
     /// Stiffness per area, N/mm^3 (1e9 Pa/m).
     stiffness: f64,
-    /// Step height, mm.
     step_height_mm: f64,
 }
 
