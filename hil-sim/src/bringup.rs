@@ -26,7 +26,6 @@ pub use operator::{Action, Operator, Question, Seen, Sensor, Stdin};
 pub use page::html;
 pub use state::Progress;
 
-/// The result of a check.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Check {
     /// Its name in [`CHECKS`].

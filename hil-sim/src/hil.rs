@@ -20,7 +20,6 @@ pub use run::{Asked, run};
 /// Why a run could not be made. Each is one line.
 #[derive(Debug, thiserror::Error)]
 pub enum HilError {
-    /// The port failed.
     #[error(transparent)]
     Port(#[from] PortError),
     /// The firmware has one controller.

@@ -222,7 +222,6 @@ impl FaultInjector {
         })
     }
 
-    /// Whether the model task hangs.
     pub(crate) fn model_hangs(&self) -> bool {
         self.is(Target::Model, Kind::Hung).is_some()
     }

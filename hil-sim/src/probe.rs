@@ -36,7 +36,6 @@ pub trait Port {
     /// Sends bytes down an RTT channel, as many as there is room for; returns how many.
     fn down(&mut self, channel: u32, bytes: &[u8]) -> Result<usize, PortError>;
 
-    /// Resets the board.
     fn reset(&mut self) -> Result<(), PortError>;
 
     /// Reads memory.

@@ -5,7 +5,6 @@
 //! wheels from PyPI in a virtual environment in the target directory. Nothing is installed
 //! elsewhere, and only builds started here use them.
 
-mod python;
 mod tools;
 
 use std::env;
@@ -15,7 +14,6 @@ use std::process::Command;
 
 use crate::firmware::{self, FirmwareError};
 
-pub use python::python;
 pub use tools::Tools;
 
 /// A part of `rig` that is a binary of its own.

@@ -28,7 +28,6 @@ const UNBALANCED: f64 = 2e-4;
 /// Possible cases for every impossible one.
 const PER_REFUSED: usize = 20;
 
-/// Figures of every case.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Figure {
@@ -75,17 +74,13 @@ pub struct Refused {
 /// Outcome of the stress.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct StressReport {
-    /// Cases run.
     pub cases: usize,
     /// Impossible cases that were refused, by reason.
     pub refused: BTreeMap<&'static str, Refused>,
-    /// Cases that failed.
     pub failed: Vec<StressFailure>,
-    /// The worst of each figure.
     pub worst: Vec<Worst>,
 }
 
-/// A case that was run: its figures, or why it failed.
 type Ran = (StressCase, Result<Vec<(Figure, f64)>, String>);
 
 /// Runs `count` cases and calls `done` after each; checks that a twentieth as many impossible

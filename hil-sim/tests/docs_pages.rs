@@ -10,6 +10,7 @@ use hil_sim::testing::long;
 use serde_json::Value;
 
 use crate::cli::{code, rig_in, stderr};
+use crate::common::python::python;
 
 /// Verbs that another program of the workspace runs; the command's own help lists them.
 const ELSEWHERE: [&str; 3] = ["bench", "modes", "paper"];
@@ -255,11 +256,11 @@ fn pandas_draws_a_log_alike() {
     if !long() {
         return;
     }
-    let python = match hil_sim::provision::python("examples", &["pandas==3.1.1"]) {
+    let python = match python("examples", &["pandas==3.1.1"]) {
         Ok(python) => python,
         Err(why) => {
             // Not `eprintln`: the tests' program keeps that to itself.
-            let _ = writeln!(std::io::stderr(), "left out: a log drawn with pandas. {why:#}");
+            let _ = writeln!(std::io::stderr(), "left out: a log drawn with pandas. {why}");
             return;
         }
     };

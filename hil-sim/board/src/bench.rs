@@ -171,18 +171,6 @@ impl<'a> Bench<'a> {
         self.end
     }
 
-    /// Runs to the end of the millisecond or to a breakpoint, whose address is returned.
-    pub fn run_to_break(&mut self) -> Result<Option<u32>, BoardError> {
-        let end = self.end();
-        Ok(self.machine.run_until(end)?)
-    }
-
-    /// Executes one instruction.
-    pub fn step_instruction(&mut self) -> Result<(), BoardError> {
-        let end = self.end();
-        Ok(self.machine.step(end)?)
-    }
-
     /// Whether the millisecond is over and [`Bench::close`] is due.
     pub fn is_due(&mut self) -> bool {
         self.machine.now() >= self.end()

@@ -98,7 +98,6 @@ pub struct Chip {
     bridges: [Bridge; 2],
     /// Faults of the hardware.
     pub defects: Defects,
-    /// The core has locked up.
     locked_up: bool,
     strays: Strays,
     reset: Option<Cause>,
@@ -191,7 +190,6 @@ impl Chip {
         self.settle(now);
     }
 
-    /// Takes a reset that the chip requests.
     pub fn take_reset(&mut self) -> Option<Cause> {
         self.reset.take()
     }
@@ -230,7 +228,6 @@ impl Chip {
         self.settle_lines(now);
     }
 
-    /// The core has locked up.
     pub fn lock_up(&mut self, now: u64) {
         self.locked_up = true;
         self.break_motors(now);

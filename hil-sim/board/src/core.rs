@@ -2,7 +2,6 @@
 
 pub mod unicorn;
 
-/// A core register.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Register {
     R(u8),

@@ -50,7 +50,6 @@ pub enum Step {
 pub struct Done {
     /// Return value of each call.
     pub values: Vec<u32>,
-    /// Cost of the calls.
     pub cost: Spread,
 }
 
@@ -82,7 +81,6 @@ pub enum CyclesError {
     /// The run in software cannot be made.
     #[error(transparent)]
     Run(#[from] RunError),
-    /// The image failed.
     #[error(transparent)]
     Image(#[from] ImageError),
     /// The core's output differs from the host's.

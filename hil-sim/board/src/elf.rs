@@ -9,7 +9,6 @@ use object::{Endianness, Object, ObjectSymbol, SymbolKind, elf};
 use super::core::unicorn::{Access, Memory};
 use super::error::ImageError;
 
-/// The chip's flash.
 pub const FLASH: Memory = Memory { base: 0x0800_0000, size: 512 * 1024, access: Access::Code };
 /// SRAM1, SRAM2 and the alias of the CCM SRAM behind them.
 pub const RAM: Memory = Memory { base: 0x2000_0000, size: 128 * 1024, access: Access::Data };
@@ -18,7 +17,6 @@ pub const RAM: Memory = Memory { base: 0x2000_0000, size: 128 * 1024, access: Ac
 /// answered; here it is, as by RAM. Only the memory protection unit keeps a stack out of them.
 pub const BELOW: Memory = Memory { base: 0x1FFF_8000, size: 32 * 1024, access: Access::Data };
 
-/// A function of the image.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Function {
     /// Its code.

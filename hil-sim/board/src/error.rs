@@ -21,7 +21,6 @@ pub enum ImageError {
     /// A call panicked or did not return.
     #[error("{function} ended in {at}")]
     Lost {
-        /// The function that was called.
         function: String,
         /// The function in which it ended.
         at: String,
@@ -38,7 +37,6 @@ impl ImageError {
 /// Why a run on the board cannot be made.
 #[derive(Debug, thiserror::Error)]
 pub enum BoardError {
-    /// The image or the core.
     #[error(transparent)]
     Image(#[from] ImageError),
     /// The plant left the set of meaningful states.

@@ -89,7 +89,6 @@ impl Exceptions {
         }
     }
 
-    /// Clears the request.
     pub fn clear(&mut self, number: u8) {
         self.pending &= !(1 << number);
         self.refresh();

@@ -19,7 +19,6 @@ const PATIENCE: u64 = 1_700_000_000;
 /// The breakpoint instruction.
 const BKPT: [u8; 2] = [0x00, 0xBE];
 
-/// Result of a call.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Call {
     /// Its return value.

@@ -15,7 +15,6 @@ pub mod error;
 pub mod exceptions;
 mod fault_injector;
 pub mod faults;
-pub mod gdb;
 pub mod image;
 pub mod load;
 pub mod log;

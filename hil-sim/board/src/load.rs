@@ -55,10 +55,8 @@ pub struct WithWaits {
     pub worst: u64,
 }
 
-/// The load of a run.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Load {
-    /// Clock of the core, Hz.
     pub clock_hz: u64,
     /// Cycles counted.
     pub cycles: u64,

@@ -4,7 +4,6 @@ use defmt_decoder::{DecodeError, StreamDecoder, Table};
 
 use super::error::ImageError;
 
-/// A line of the log.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Line {
     /// Level, in lower case; empty for plain output.
@@ -27,7 +26,6 @@ impl Line {
     }
 }
 
-/// The strings of an image's log.
 pub struct Strings(Table);
 
 impl Strings {

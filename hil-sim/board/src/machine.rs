@@ -263,22 +263,6 @@ impl Machine {
         Ok(None)
     }
 
-    /// Executes one instruction, or takes an exception; asleep it passes time, up to this
-    /// cycle at most. Slow: the engine translates the code again.
-    pub fn step(&mut self, cycle: u64) -> Result<(), CoreError> {
-        while self.now() < cycle {
-            let depth = self.chip().system.exceptions.depth();
-            if self.executes(cycle)? {
-                let stop = self.core.step(self.pc)?;
-                return self.follow(stop).map(|_| ());
-            }
-            if self.chip().system.exceptions.depth() != depth {
-                break;
-            }
-        }
-        Ok(())
-    }
-
     /// Runs until this cycle; a breakpoint instruction is a fault, as without a debugger.
     pub fn run_on(&mut self, cycle: u64) -> Result<(), CoreError> {
         while self.run_until(cycle)?.is_some() {

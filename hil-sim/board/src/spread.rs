@@ -8,9 +8,7 @@ use crate::core::Meter;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Spread {
     pub calls: u64,
-    /// Cycles of all calls.
     pub cycles: u64,
-    /// Instructions of all calls.
     pub instructions: u64,
     /// Cycles of the cheapest call.
     pub min: u64,

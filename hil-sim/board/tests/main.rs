@@ -7,7 +7,6 @@ mod faults;
 mod firmware;
 mod first_board;
 mod flash;
-mod gdb;
 mod getting_started;
 mod hil;
 mod kept;

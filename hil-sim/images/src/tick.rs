@@ -59,7 +59,6 @@ impl Preset {
     /// Every preset.
     pub const ALL: [Self; 2] = [Self::Prototype, Self::Fe];
 
-    /// The preset of this name.
     pub fn named(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|preset| preset.name() == name)
     }

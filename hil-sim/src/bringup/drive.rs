@@ -99,6 +99,7 @@ fn silent_bridge(session: &mut Session<'_, '_>, slow: &Motion) -> Result<Check, 
     Ok(check("drive bridge", false, format!("0 %{}", fault(slow)), advice))
 }
 
+/// Change of the preload by a motion, N.
 fn preload_change(motion: &Motion, scale: &Scale) -> f64 {
     let rows = &motion.rows;
     let before = mean(rows.iter().take(15).map(|row| scale.preload(row))).0;

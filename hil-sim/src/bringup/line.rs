@@ -69,7 +69,6 @@ pub(super) struct Motion {
     pub mode: Mode,
 }
 
-/// The line to a board.
 pub struct Line<'p> {
     client: Client<Listener<'p>>,
 }

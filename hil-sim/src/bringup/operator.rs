@@ -8,9 +8,7 @@ use super::BringupError;
 /// A sensor with a plug.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sensor {
-    /// Preload sensor.
     Preload,
-    /// Compression sensor.
     Compression,
 }
 

@@ -37,7 +37,7 @@ pub struct Args {
 
     /// With --target board: the plant is in the loop as with --target probe, not at the
     /// board's pins.
-    #[arg(long, conflicts_with_all = ["board_fault", "gdb"])]
+    #[arg(long, conflicts_with = "board_fault")]
     pub hil: bool,
 
     /// Fault of the emulated board's hardware and its time, may be repeated:
@@ -46,11 +46,6 @@ pub struct Args {
     /// or flip=ADDRESS.BIT, each at its seconds from power-up.
     #[arg(long, value_name = "FAULT@S")]
     pub board_fault: Vec<String>,
-
-    /// Waits for a debugger (GDB remote protocol) at this address and gives it control of the
-    /// emulated board: no files, no summary.
-    #[arg(long, value_name = "[HOST]:PORT", conflicts_with_all = ["out", "json"])]
-    pub gdb: Option<String>,
 
     /// Shows the controller's log on standard error.
     #[arg(long)]
@@ -155,9 +150,8 @@ pub fn read(path: &Path) -> Result<Vec<u8>, Failure> {
 /// Refuses options that need the emulated board.
 fn takes_board(args: &Args) -> Result<(), Failure> {
     let fault = args.board_fault.first().map(|fault| format!("--board-fault {fault}"));
-    let debugger = args.gdb.as_ref().map(|address| format!("--gdb {address}"));
     let hil = (args.hil && args.target == "sil").then(|| "--hil".to_owned());
-    match debugger.or(fault).or(hil) {
+    match fault.or(hil) {
         Some(option) => Err(Failure::input(format!("{option}: takes --target board"))),
         None => Ok(()),
     }
@@ -281,7 +275,6 @@ mod tests {
         for (arguments, named) in [
             ("--hil", "--hil"),
             ("--target probe --board-fault encoder-line-a@1", "--board-fault encoder-line-a@1"),
-            ("--gdb :3333", "--gdb :3333"),
         ] {
             let error = takes_board(&parsed(arguments)).unwrap_err().to_string();
             assert_eq!(error, format!("{named}: takes --target board"));

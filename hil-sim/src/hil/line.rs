@@ -37,7 +37,6 @@ impl<'a> HostLine<'a> {
         Self { port, gatherer: FrameReader::new() }
     }
 
-    /// One tick of the board.
     pub fn tick(&mut self, tick: Tick, given: Given) -> Result<Taken, HilError> {
         let answers = |answer: &ToHost| !matches!(answer, ToHost::Done(done, _) if *done != tick);
         match self.ask(&ToBoard::Tick(tick, given), answers)? {

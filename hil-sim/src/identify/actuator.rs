@@ -16,7 +16,9 @@ use super::noise::Noise;
 use super::record::{Record, Sample, TICK_S};
 
 /// Dead time, ms.
+/// Dead time, ms.
 pub(crate) const DELAY: usize = 0;
+/// Logarithm of the lag, s.
 /// Logarithm of the lag, s.
 pub(crate) const LAG: usize = 1;
 /// Slew, N/s by the preload sensor.
@@ -41,8 +43,8 @@ pub struct Actuator {
     /// Coordinates.
     pub x: Vec<f64>,
     pub covariance: DMatrix<f64>,
-    /// Residuals, N, by log.
     pub residuals: Vec<Vec<f64>>,
+    /// Their times, s.
     pub times: Vec<Vec<f64>>,
 }
 

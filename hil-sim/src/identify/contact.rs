@@ -39,9 +39,7 @@ pub struct Contact {
     /// Coordinates.
     pub x: Vec<f64>,
     pub covariance: DMatrix<f64>,
-    /// Trajectories of the logs there.
     pub trajectories: Vec<Trajectory>,
-    /// Residuals, by log and channel.
     pub residuals: Vec<Channels>,
 }
 

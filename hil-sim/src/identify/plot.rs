@@ -18,7 +18,6 @@ const TITLE: u32 = 24;
 const TITLE_PX: f64 = 13.0;
 const LEFT: i32 = 78 * S;
 
-/// The residuals of a log as SVG.
 pub fn svg(rows: &[&Residuals]) -> String {
     let times = rows.iter().flat_map(|row| row.series.iter().map(|(t, _)| *t));
     let x = padded(extent(times).unwrap_or((0.0, 1.0)), 0.01);

@@ -30,7 +30,6 @@ const CONVERTER: f64 = 65_535.0;
 pub struct Sample {
     /// Wheel encoder since boot, counts, unwrapped.
     pub counts: f64,
-    /// Preload sensor, N.
     pub preload_n: f64,
     /// Tread compression, mm.
     pub compression_mm: f64,

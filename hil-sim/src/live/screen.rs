@@ -80,7 +80,6 @@ impl Screen {
         }
     }
 
-    /// Takes an item.
     pub fn see(&mut self, item: &Item) {
         self.view.see(item);
         match item {

@@ -65,7 +65,6 @@ impl Server {
         self.address
     }
 
-    /// Number of connected clients.
     #[cfg(test)]
     pub(crate) fn clients(&self) -> usize {
         lock(&self.clients).len()

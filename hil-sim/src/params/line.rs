@@ -105,7 +105,6 @@ impl<W: Wire> Client<W> {
         }
     }
 
-    /// Restarts the board.
     pub fn restart(&mut self) -> Result<(), StoreError> {
         self.done(Request::Restart)
     }

@@ -13,7 +13,6 @@ use interstage::sense::raw::SensorFrame;
 use interstage::tick::Entry;
 use serde::{Deserialize, Serialize};
 
-/// An item of a log.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Item {
     /// The target's identity; once a second.
@@ -27,7 +26,6 @@ pub enum Item {
     Event(Entry),
     /// A part of a capture.
     CaptureChunk(CaptureChunk),
-    /// The ledger line of a crossing.
     Ledger(Line),
     /// Something is missing here.
     Mark(Mark),

@@ -84,7 +84,6 @@ pub enum Topic {
     Crossing,
     /// A [`Summary`].
     Summary,
-    /// A frame of the controller.
     Frames,
 }
 
@@ -191,7 +190,6 @@ impl<W: Write + Seek> McapFile<W> {
         Ok(self.out.write_metadata(&Metadata { name: name.to_owned(), metadata })?)
     }
 
-    /// The controller's parameters.
     pub(super) fn parameters(&mut self, toml: &str) -> Result<(), Failure> {
         self.metadata("parameters", [("toml".to_owned(), toml.to_owned())])
     }

@@ -8,7 +8,6 @@ use interstage::supervise::{Command, Mode};
 use crate::scenario::{Direction, Scenario};
 use crate::session::{self, Session};
 
-/// A source that failed.
 #[derive(Debug, thiserror::Error)]
 pub enum SourceError {
     /// The bytes of the input of this name cannot be read.
@@ -20,7 +19,6 @@ pub enum SourceError {
     /// A source of another crate failed.
     #[error(transparent)]
     Other(Box<dyn std::error::Error + Send + Sync>),
-    /// The board at a probe failed.
     #[error(transparent)]
     Port(#[from] crate::probe::PortError),
 }

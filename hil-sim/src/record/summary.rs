@@ -17,9 +17,7 @@ pub struct CrossingLine {
     pub preload_n: f64,
     /// True gap: clearance between step root and undeformed wheel at that instant, mm.
     pub gap_mm: f64,
-    /// Gap that the controller predicted, mm.
     pub gap_predicted_mm: Option<f64>,
-    /// Gap that the controller measured, mm.
     pub gap_measured_mm: Option<f64>,
     /// Largest force of corner and face on the wheel, N.
     pub corner_force_n: f64,
@@ -81,7 +79,6 @@ pub struct Summary {
     pub controller: String,
     /// `deploy` or `retract`.
     pub direction: String,
-    /// Rig preset.
     pub rig: String,
     /// Seed of the plant's draw.
     pub seed: u64,
@@ -148,7 +145,6 @@ pub struct Summary {
 /// A complete run.
 #[derive(Clone, Debug, Default)]
 pub struct Recording {
-    /// Summary and ledger.
     pub summary: Summary,
     pub rows: Vec<Tick>,
     pub log: Vec<LogLine>,

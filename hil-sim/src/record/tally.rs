@@ -41,7 +41,6 @@ pub(super) struct Tally {
     passed: u32,
 }
 
-/// The end of a run.
 pub(super) struct Ended<'a> {
     /// What ran the controller.
     pub(super) target: &'static str,

@@ -86,7 +86,6 @@ fn split(mode: Mode) -> (u8, bool, u8) {
     }
 }
 
-/// One tick of a log.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Tick {
     /// The controller's inputs and outputs.
@@ -135,11 +134,9 @@ pub struct Controller {
     pub wheel_encoder_code: Option<u16>,
     /// When it was taken, ticks.
     pub wheel_encoder_at: Option<u32>,
-    /// Code of the preload sensor.
     pub preload_code: Option<u16>,
     /// When it was taken, ticks.
     pub preload_at: Option<u32>,
-    /// Code of the compression sensor.
     pub compression_code: Option<u16>,
     /// When it was taken, ticks.
     pub compression_at: Option<u32>,

@@ -29,7 +29,6 @@ impl Default for View {
 }
 
 impl View {
-    /// Takes an item.
     pub fn see(&mut self, item: &Item) {
         match item {
             Item::Tick(record, sensors) => self.row = Some(Controller::of(record, sensors)),

@@ -7,7 +7,6 @@ use crate::record::CrossingLine;
 /// The true value that a column is compared with, and the error as text.
 type Truth = (fn(&CrossingLine) -> f64, fn(f64, f64) -> String);
 
-/// A column of the ledger.
 pub(crate) struct Column {
     pub(crate) name: &'static str,
     pub(crate) unit: &'static str,

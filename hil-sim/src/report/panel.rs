@@ -59,7 +59,6 @@ impl Look {
     }
 }
 
-/// A line of a plot.
 pub(crate) struct Line {
     /// Its name in the legend.
     pub(crate) name: Cow<'static, str>,
@@ -75,7 +74,6 @@ pub(crate) enum Shape {
     Triangle,
 }
 
-/// Marks of a plot.
 pub(crate) struct Marks {
     pub(crate) name: Cow<'static, str>,
     pub(crate) shape: Shape,

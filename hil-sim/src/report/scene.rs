@@ -36,7 +36,6 @@ pub(super) const COLUMNS: [(&str, i32); 10] = [
 pub(super) struct Scene {
     /// The rows are what the controller measured: no truth is known.
     pub(super) measured: bool,
-    /// The run retracts.
     pub(super) retracts: bool,
     /// Reference of the gap, mm; unknown in a log without parameters.
     pub(super) gap_ref_mm: f64,

@@ -12,7 +12,6 @@ use crate::plant::spread::{Noise, Spread};
 /// Names of the presets.
 pub const PRESETS: [&str; 2] = ["prototype", "fe"];
 
-/// One key of a scenario.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct KeyInfo {
     /// Dotted path, as in `--set`.

@@ -100,7 +100,6 @@ impl Merged {
     }
 }
 
-/// A file's path and its table.
 pub(super) fn read(path: &Path) -> Result<(String, Table), ScenarioError> {
     let name = path.display().to_string();
     let text = std::fs::read_to_string(path)

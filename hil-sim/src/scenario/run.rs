@@ -82,7 +82,6 @@ impl ControllerKind {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum MismatchDraw {
-    /// As the scenario states it.
     #[default]
     Stated,
     /// Drawn by the seed within the wide ranges; what is stated and not neutral stays.

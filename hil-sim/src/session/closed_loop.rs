@@ -255,7 +255,6 @@ impl Session {
         }
     }
 
-    /// The controller's mode.
     pub const fn mode(&self) -> Mode {
         self.state.mode()
     }

@@ -72,7 +72,6 @@ fn into(bytes: &mut Vec<u8>) -> impl FnMut(&[u8]) -> bool {
     }
 }
 
-/// The identity of the controller on this host.
 fn of(scenario: &Scenario, controller: &Controller) -> Identity {
     Identity {
         schema: identity::SCHEMA,

@@ -39,6 +39,7 @@ const STIFFNESS: Range = Range::Decades(1e6, 1e12);
 const STIFFENING: Range = Range::Decades(1.0, 100.0);
 /// Relaxation time, s.
 const TAU: Range = Range::Decades(1e-6, 1e3);
+/// Step of time, s.
 const STEP_OF_TIME: Range = Range::Decades(1e-6, 20e-3);
 /// Moved mass over the drive's reflected mass.
 const MASS_RATIO: Range = Range::Decades(1e-3, 1e3);
@@ -47,6 +48,7 @@ const SPEED: Range = Range::Even(0.0, 2000.0);
 /// Height of the step, mm.
 const STEP: Range = Range::Even(0.0, 20.0);
 const FRICTION: Range = Range::Even(0.0, 3.0);
+/// Preload, N.
 const PRELOAD: Range = Range::Decades(5.0, 150.0);
 /// Axial load, N.
 const LOAD: Range = Range::Even(0.0, 60.0);
@@ -54,7 +56,6 @@ const LOAD: Range = Range::Even(0.0, 60.0);
 /// Parameters whose ends are all combined as corners.
 const ENDS: usize = 8;
 
-/// Dimensions of a case.
 const DIMENSIONS: usize = 13;
 
 /// How the wheel is driven.

@@ -44,7 +44,6 @@ use sweeps::{Sweep, Variable};
 pub struct Study {
     /// The figures, in the study's order.
     pub figures: Vec<Figure>,
-    /// The claims, by figure.
     pub claims: Vec<Claim>,
 }
 

@@ -2,6 +2,8 @@
 
 #![allow(dead_code, reason = "each test file uses its part of this")]
 
+pub(crate) mod python;
+
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use hil_sim::plant::ledger::Crossing;

@@ -18,6 +18,8 @@ use interstage::log::TICKS_PER_FRAME;
 use interstage::rig::Rig;
 use interstage::supervise::{Command as Order, Mode};
 use interstage::units::Q16;
+
+use crate::common::python::python;
 use serde_json::Value;
 
 /// Largest error of the log while moving. Position: the tolerance of the steps'
@@ -141,35 +143,11 @@ fn an_hour_of_deploying_and_retracting_is_logged_without_a_gap() {
     assert!(more.get(more.len() / 2).is_none_or(|median| *median < (3 << 20)), "{memory:?}");
 }
 
-/// Python with the `mcap` package, which has nothing in common with the writer.
-fn python() -> PathBuf {
-    let target = std::env::var_os("CARGO_TARGET_DIR").map_or_else(
-        || Path::new(env!("CARGO_MANIFEST_DIR")).with_file_name("target"),
-        PathBuf::from,
-    );
-    let folder = target.join("mcap-reader");
-    let program = folder.join("bin/python3");
-    let ready = |program: &Path| {
-        let asked = Command::new(program).args(["-c", "import mcap.reader, lz4"]).output();
-        asked.is_ok_and(|output| output.status.success())
-    };
-    if !ready(&program) {
-        let run = |command: &mut Command| {
-            let output = command.output().expect("starts");
-            assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-        };
-        run(Command::new("python3").args(["-m", "venv"]).arg(&folder));
-        let pip = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check"];
-        run(Command::new(&program).args(pip).arg("mcap==1.6.0"));
-        assert!(ready(&program), "the package is there");
-    }
-    program
-}
-
 /// What Python finds in a file.
 fn found(file: &Path) -> Value {
-    let output =
-        Command::new(python()).arg(data("read_mcap.py")).arg(file).output().expect("starts");
+    // The package has nothing in common with the writer.
+    let python = python("mcap-reader", &["mcap==1.6.0"]).expect("the package");
+    let output = Command::new(python).arg(data("read_mcap.py")).arg(file).output().expect("starts");
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     serde_json::from_slice(&output.stdout).expect("JSON")
 }

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use hil_sim::cli::deploy::{Args, looped, place, read, write};
+use hil_sim::cli::deploy::{Args, looped, place, write};
 use hil_sim::cli::failure::{Failure, Outcome};
 use hil_sim::cli::output;
 use hil_sim::cli::terminal;
@@ -12,7 +12,6 @@ use hil_sim::report::Section;
 use hil_sim::scenario::Scenario;
 use hil_sim::{files, progress};
 
-use crate::gdb;
 use crate::load::{Load, TITLE};
 use crate::log::Line;
 use crate::port::EmulatedPort;
@@ -37,20 +36,12 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     }
     let faults: Result<Vec<_>, _> = args.board_fault.iter().map(|text| text.parse()).collect();
     let faults = faults.map_err(|error| Failure::input(format!("--board-fault {error}")))?;
-    let listener = args.gdb.as_deref().map(gdb::listen).transpose().map_err(Failure::input)?;
-    let path = firmware::build(Profile::Release)?;
-    let elf = read(&path)?;
+    let elf = firmware::image(Profile::Release)?;
     let show = |t_s: f64, line: &Line| {
-        if args.log || args.gdb.is_some() {
+        if args.log {
             eprintln!("[{t_s:8.3}] {:<5} {}", line.level, line.text);
         }
     };
-    if let Some(listener) = listener {
-        let address = listener.local_addr().map_err(Failure::run)?;
-        eprintln!("waiting for a debugger: gdb {} -ex 'target remote {address}'", path.display());
-        gdb::serve(&listener, &elf, &scenario, show).map_err(Failure::run)?;
-        return Ok(Outcome::Good);
-    }
     let options = RunOptions { rows: directory.is_some(), faults, wait_states: true };
     let ran = {
         let _progress = (!args.log).then(|| progress::spinner(scenario.run.direction.name()));

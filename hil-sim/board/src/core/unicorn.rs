@@ -29,9 +29,7 @@ use unicorn_engine::{
 
 use self::count::Count;
 use super::{Access as Touch, Bus, CoreError, Fault, Mark, Meter, NoBus, Register, Stop, passes};
-use crate::timing;
 
-/// Memory of the board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Memory {
     /// First address.
@@ -79,7 +77,6 @@ const RETURN: u32 = 8;
 const RETURN_BITS: u32 = 0xFFFF_FF01;
 /// `WFE`, `WFI` and `SEV` in memory.
 const WFE: [u8; 2] = [0x20, 0xBF];
-const WFI: [u8; 2] = [0x30, 0xBF];
 const SEV: [u8; 2] = [0x40, 0xBF];
 /// The state of thumb code outside of a conditional block, among the flags.
 const THUMB: u64 = 1 << 24;
@@ -284,13 +281,6 @@ impl<B: Bus + 'static> UnicornCore<B> {
         engine("map the bus", mapped)
     }
 
-    /// Whether the instruction there is `WFI`.
-    fn is_wait(&self, address: u32) -> Result<bool, CoreError> {
-        let mut code = [0; 2];
-        self.read(address & !1, &mut code)?;
-        Ok(code == WFI)
-    }
-
     /// Runs from `address` until a hook stops it, it gets to `until`, or it has executed so many
     /// instructions, if that is not 0.
     fn go(
@@ -392,24 +382,6 @@ impl<B: Bus + 'static> UnicornCore<B> {
     /// Runs from `address` until something stops the core, `cycles` at most.
     pub fn run(&mut self, address: u32, cycles: u64) -> Result<Stop, CoreError> {
         self.go(address, cycles, (u64::MAX, 0))
-    }
-
-    /// Executes the instruction at `address`, or the conditional block that begins there. Slow:
-    /// the engine translates again.
-    pub fn step(&mut self, address: u32) -> Result<Stop, CoreError> {
-        let before = self.meter();
-        engine("forget code", self.engine.ctl_flush_tb())?;
-        let stop = self.go(address, 1, (u64::MAX, 1))?;
-        engine("forget code", self.engine.ctl_flush_tb())?;
-        // The hook counted the complete block, of which one instruction was executed.
-        let count = &mut self.engine.get_data_mut().count;
-        let instruction = count.at(address).map_or(0, |found| timing::extra(found.kind));
-        count.meter.cycles = before.cycles + 1 + instruction;
-        count.meter.instructions = before.instructions + 1;
-        Ok(match stop {
-            Stop::Wait(at) if !self.is_wait(address)? => Stop::Spent(at),
-            stop => stop,
-        })
     }
 
     /// The same, or until the program gets to `until`. Slow: the engine translates again.

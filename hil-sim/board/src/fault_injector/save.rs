@@ -14,7 +14,6 @@ const RETRY: u32 = 10;
 pub(crate) enum Saving {
     /// Requested; the board refuses, or has not answered yet.
     Requested,
-    /// The board writes.
     Writing,
     /// The board restarted before it confirmed the save.
     Interrupted,
@@ -28,7 +27,6 @@ pub(super) struct Save {
     cut: Cut,
     armed: bool,
     pub(super) state: Saving,
-    /// Requests that the board has accepted.
     accepted: usize,
     /// Number of the request without an answer.
     open: Option<u16>,

@@ -46,7 +46,6 @@ impl Machine {
         self.core.set_spoilt(self.core.bus().flash.spoilt())
     }
 
-    /// A register of the core.
     pub fn register(&self, register: Register) -> Result<u32, CoreError> {
         self.core.register(register)
     }
@@ -56,7 +55,6 @@ impl Machine {
         self.pc
     }
 
-    /// Sets a register of the core.
     pub fn set_register(&mut self, register: Register, value: u32) -> Result<(), CoreError> {
         if register == Register::Pc {
             self.pc = value & !1;

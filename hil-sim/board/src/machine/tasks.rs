@@ -9,7 +9,6 @@ const POLL: &str = "TaskStorage<F>::poll";
 /// Name of the memory of a task inside the function that spawns it.
 const POOL: &str = "POOL";
 
-/// The tasks of an image.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Tasks {
     /// Address of a task's memory, and its name, in the order of the addresses.

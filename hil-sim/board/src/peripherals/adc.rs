@@ -53,7 +53,6 @@ impl Adc {
         self.inputs[converter][channel] = sixteen;
     }
 
-    /// Whether a converter requests DMA.
     pub fn wants_dma(&self, converter: usize) -> bool {
         let converter = &self.converters[converter];
         converter.wants_dma(converter.registers.get(CFGR))

@@ -9,7 +9,6 @@ use super::registers::{Kept, Registers};
 use super::{Peripheral, Write};
 use crate::rules::Rule;
 
-/// Channels of one controller.
 pub const CHANNELS: usize = 8;
 
 const ISR: u32 = 0x00;

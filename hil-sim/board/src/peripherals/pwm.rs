@@ -156,7 +156,6 @@ impl Pwm {
         self.update = self.update.saturating_add(cycles);
     }
 
-    /// Sets the level of the chip's own break.
     pub fn set_system_break(&mut self, level: bool, now: u64) {
         self.system = level;
         self.rearm(now);

@@ -37,7 +37,6 @@ pub struct Frame {
     pub bits: u32,
     /// `CPOL` and `CPHA`.
     pub mode: u32,
-    /// Cycles of the core in a bit.
     pub bit_cycles: u64,
 }
 

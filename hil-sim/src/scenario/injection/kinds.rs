@@ -32,7 +32,6 @@ pub enum Target {
     Load,
     /// Control tick.
     Tick,
-    /// Model task.
     Model,
     /// Reader of the log.
     Log,
@@ -43,7 +42,6 @@ pub enum Target {
     PreloadSensorConverter,
     /// Converter of the compression sensor.
     TreadConverter,
-    /// Bus of the angle sensor.
     AngleBus,
     /// Line A of the wheel encoder.
     EncoderLineA,
@@ -60,16 +58,12 @@ pub enum Target {
     WheelEncoderTask,
     PreloadSensorTask,
     CompressionSensorTask,
-    /// Task of the angle sensor.
     ArmAngleTask,
     /// Task of the control tick.
     TickTask,
     ModelTask,
-    /// Task of the log.
     JournalTask,
-    /// Task of the host's line.
     LineTask,
-    /// The board's supply.
     Supply,
     ResetPin,
     Debugger,
@@ -88,7 +82,6 @@ pub enum Target {
     Magnet,
     /// Wire of the emergency stop.
     StopWire,
-    /// Option bytes of the chip.
     OptionBytes,
 }
 
@@ -138,7 +131,6 @@ pub enum Kind {
     Random,
     /// Flips bits.
     BitErrors,
-    /// Resets the board.
     Reset,
     /// Starts again with its record.
     Recorded,
@@ -150,7 +142,6 @@ pub enum Kind {
     OneWrongBit,
     /// Has two wrong bits, which are reported.
     TwoWrongBits,
-    /// Halts the core.
     Halted,
     Shorted,
 }
@@ -164,7 +155,6 @@ fn word(value: impl Serialize) -> String {
 }
 
 impl Target {
-    /// Its name in scenarios.
     pub fn name(self) -> String {
         word(self)
     }
@@ -215,7 +205,6 @@ impl Kind {
         matches!(self, Off | Stuck | Reversed | Delayed | Runaway | Regulating)
     }
 
-    /// Its name in scenarios.
     pub fn name(self) -> String {
         word(self)
     }

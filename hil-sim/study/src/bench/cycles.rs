@@ -39,7 +39,6 @@ pub struct Calls {
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 pub struct Cost {
     pub calls: u64,
-    /// Cycles of all calls.
     pub cycles: u64,
     /// Cycles of the costliest call.
     pub max: u64,
@@ -52,7 +51,6 @@ pub struct Tick {
     pub mean: f64,
     /// The costliest tick.
     pub worst: u64,
-    /// Its task in the firmware.
     pub firmware: Firmware,
 }
 

@@ -30,7 +30,6 @@ pub struct Peak {
     pub value: f64,
 }
 
-/// The histories of one case.
 #[derive(Clone, Debug)]
 pub struct Histories {
     pub case: Case,
@@ -129,7 +128,6 @@ impl Histories {
             / most(f64::NEG_INFINITY, f64::INFINITY)
     }
 
-    /// The quantity as a plot.
     pub fn panel(&self, quantity: Quantity) -> Panel {
         let title = format!("{} {}", ["(a)", "(b)", "(c)"][quantity as usize], self.case.name());
         let means = self.means.iter().map(|mean| quantity.of(mean).clone());

@@ -15,7 +15,6 @@ const NEAR: f64 = 0.1;
 /// Shape or frequency equation of a beam.
 type Classical = fn(f64, f64) -> f64;
 
-/// The modes of the figure.
 #[derive(Clone, Debug)]
 pub struct Modes {
     beam: Beam,

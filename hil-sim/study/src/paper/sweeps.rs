@@ -94,6 +94,7 @@ pub struct Curves {
 pub struct Sweep {
     /// What is swept.
     pub variable: Variable,
+    /// Gap, mm.
     pub gap: Curves,
     /// True gap of the plant instead of the measured one, mm.
     pub true_gap: Means,

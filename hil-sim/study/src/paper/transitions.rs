@@ -19,7 +19,6 @@ const FIRST_BEFORE_S: f64 = 2.0;
 /// interval.
 const AT_2_S: (f64, f64) = (1.9, 2.1);
 
-/// The cases of the figure.
 pub fn cases() -> Vec<Case> {
     CASES.map(|(speed, preload)| Case::new(Loads::Prototype, speed, preload)).to_vec()
 }

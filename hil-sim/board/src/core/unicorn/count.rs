@@ -146,11 +146,6 @@ impl Count {
         }
     }
 
-    /// The instruction at an address of the counted code.
-    pub(super) fn at(&self, address: u32) -> Option<thumb::Instruction> {
-        thumb::decode(self.bytes.get((address & !1).wrapping_sub(self.base) as usize..)?)
-    }
-
     /// What decides about the cycles of the instruction at this address, if that is known
     /// only when it is reached.
     pub(super) fn deferred(&self, address: u32) -> Option<Kind> {

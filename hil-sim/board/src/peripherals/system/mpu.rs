@@ -11,7 +11,6 @@ const RNR: u32 = 0xD98;
 const RBAR: u32 = 0xD9C;
 const RASR: u32 = 0xDA0;
 
-/// Regions of this core.
 const REGIONS: usize = 8;
 /// Of CTRL: on, on in faults too, default map for privileged accesses.
 const ENABLE: u32 = 1;
