@@ -19,3 +19,4 @@ pub mod rolling;
 pub mod sensors;
 pub mod spread;
 pub mod wall;
+pub mod wind_up;

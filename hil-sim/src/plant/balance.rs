@@ -247,6 +247,7 @@ impl Balance {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::plant::grip::Gives;
     use crate::plant::ring::RingParameters;
     use crate::plant::wall::{Step, Wall};
 
@@ -275,8 +276,7 @@ mod tests {
     fn carried(load_n: f64) -> Grip {
         Grip {
             mu: 0.9,
-            creep: 0.01,
-            rolling: 8.0,
+            gives: Gives::Creeps { creep: 0.01, rolling: 8.0 },
             load_n,
             inertia: 1.0,
             speed: 8.0,

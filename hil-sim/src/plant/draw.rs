@@ -10,6 +10,7 @@ use super::arm::{Arm, ModeParameters};
 use super::ring::RingParameters;
 use super::spread::{Noise, Spread};
 use super::wall::{Step, Wall};
+use super::wind_up::Shear;
 
 /// Elements of the ring in a deployment. With the usual stride the gap is within 0.25 %,
 /// the largest force within 0.3 % of a ring twenty times as fine. Two thirds of them keep
@@ -39,6 +40,9 @@ pub struct PlantParameters {
     pub friction_waves: (f64, f64),
     /// Creepage at 63 % of friction.
     pub elastic_creep: f64,
+    /// Compliance along the wall over that of the tread's layer: the part that is taken into
+    /// account, 0 for a tread that is rigid there, and its factor.
+    pub wind_up: (f64, f64),
     /// Part of the compression by which the rolling radius is less than the undeformed one.
     pub rolling_compression: f64,
     /// Axial load on this wheel, N.
@@ -139,6 +143,12 @@ impl PlantParameters {
         self.mu * (1.0 + amplitude * (std::f64::consts::TAU * position_mm / length_mm).sin())
     }
 
+    /// The tread displaced along the wall.
+    #[must_use]
+    pub fn shear(&self) -> Shear {
+        Shear::of(&self.ring, self.wind_up.0 * self.wind_up.1)
+    }
+
     /// The plant of a seed: `rig` with this spread, and with these steps, each its position
     /// and how much higher than the table says it is, mm. Seed 0 is the nominal rig without
     /// mismatch; its sensors still quantise and have their noise.
@@ -205,6 +215,7 @@ impl PlantParameters {
             mu,
             friction_waves: (0.0, 22.0),
             elastic_creep: rig.plant.elastic_creep,
+            wind_up: (0.0, 1.0),
             rolling_compression: 1.0 / 3.0,
             load_n: load,
             mass_kg: rig.plant.moved_mass_kg,

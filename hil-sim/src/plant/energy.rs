@@ -1,8 +1,8 @@
 //! Where the drive's work goes: the sums of a run.
 
 /// Work and losses since the start, mJ. The first law over any part of a run reads
-/// `motor = gear + worm + creep + contact + load + preload + arm + change of kinetic`, and over
-/// one that begins and ends in the same state of the tread `contact = tread`.
+/// `motor = gear + worm + creep + contact + load + preload + arm + change of wound and kinetic`,
+/// and over one that begins and ends in the same state of the tread `contact = tread`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Energy {
     /// Work of the motor, what it is braked with negative.
@@ -11,7 +11,7 @@ pub struct Energy {
     pub gear_mj: f64,
     /// Loss in the self-locking worm: what a load along the motion brings.
     pub worm_mj: f64,
-    /// Loss by creep and slip of the tread on the wall.
+    /// Loss by creep and slip of the tread on the wall, and in its rubber displaced along it.
     pub creep_mj: f64,
     /// What the normal pressure of the contact takes from axle and tread.
     pub contact_mj: f64,
@@ -23,6 +23,8 @@ pub struct Energy {
     pub preload_mj: f64,
     /// Work on the modes of the arm and on the friction of its pivot.
     pub arm_mj: f64,
+    /// Elastic energy of the tread displaced along the wall, now.
+    pub wound_mj: f64,
     /// Kinetic energy of rotor and carriage, now.
     pub kinetic_mj: f64,
 }
@@ -33,7 +35,7 @@ impl Energy {
     pub fn missing_mj(&self, start: &Self) -> f64 {
         let total = |e: &Self| {
             let lost = e.gear_mj + e.worm_mj + e.creep_mj + e.tread_mj;
-            e.motor_mj - lost - e.load_mj - e.preload_mj - e.arm_mj - e.kinetic_mj
+            e.motor_mj - lost - e.load_mj - e.preload_mj - e.arm_mj - e.wound_mj - e.kinetic_mj
         };
         total(self) - total(start)
     }

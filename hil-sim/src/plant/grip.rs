@@ -4,7 +4,9 @@
 //! is taken along. Taken one after the other, with the forces of the step before, a carriage
 //! is caught at once that friction would have to accelerate, and energy comes from nowhere.
 //! Here the friction cone is resolved within the step: its end velocities are those that its
-//! forces give.
+//! forces give, and so does the tread between them ([`wind_up`](super::wind_up)).
+
+use super::wind_up::Winding;
 
 /// Logarithm of the part of friction left over, from which on a wheel counts as sliding:
 /// 99.9 % of it used.
@@ -13,21 +15,34 @@ pub(super) const SLIDES_FROM: f64 = 6.907_755_278_982_137;
 /// Slip that is rounding, mm/s.
 const STANDS_BELOW: f64 = 1e-9;
 
+/// How the tread gives way to traction.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Gives {
+    /// It creeps by `rolling creep q` with q = -ln(1 - p): at first in proportion to the part p of
+    /// friction that is used, without bound as p comes to 1.
+    Creeps {
+        /// Creepage at 63 % of friction.
+        creep: f64,
+        /// Speed of the tread that it creeps in proportion to, mm/s, not negative.
+        rolling: f64,
+    },
+    /// It winds up, and creeps: at first in proportion to traction, by Carter (1926)
+    /// `2 (1 - sqrt(1 - p)) / p` times as much, twice at the limit of friction, where it slides.
+    WindsUp(Winding),
+}
+
 /// A driven wheel on a step of time from known speeds.
 ///
-/// With p the part of friction used, q = -ln(1 - p) and sigma the speed of the tread, the
-/// tread creeps by `sigma creep q`: at first in proportion to p, without bound as p comes
-/// to 1. With c and s the cosine and sine sums of the contact and m/dt its inertia, the
-/// carriage ends the step at `v1 = v0 + (mu p c - s - load) dt/m`, and friction is that for
-/// which this is `advance u1 - sigma creep q`, u1 being the tread's speed then.
+/// With p the part of friction used, c and s the cosine and sine sums of the contact and m/dt the
+/// carriage's inertia, the carriage ends the step at `v1 = v0 + (mu p c - s - load) dt/m`.
+/// Friction is that for which this is the speed of a gripping wheel, `advance u1` with the
+/// tread's speed u1, less what the tread [gives](Gives) way by.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Grip {
     /// Friction of tread on wall.
     pub mu: f64,
-    /// Creepage at 63 % of friction.
-    pub creep: f64,
-    /// Speed of the tread that it creeps in proportion to, mm/s, not negative.
-    pub rolling: f64,
+    /// How the tread gives way.
+    pub gives: Gives,
     /// Axial load on the carriage, N.
     pub load_n: f64,
     /// Carriage's inertia over the step, N per mm/s.
@@ -67,29 +82,46 @@ impl Grip {
             return (0.0, (0.0, 0.0));
         }
         let most = self.mu * cosine;
-        let mut asked = self.asked(self.tread, sine);
-        let lag = self.inertia * self.rolling * self.creep;
+        let slows = self.inertia * self.advance;
+        // All of friction takes this off the carriage's momentum by winding up and by creep.
+        let (winds, lag, wound) = match self.gives {
+            Gives::Creeps { creep, rolling } => (0.0, self.inertia * rolling * creep, 0.0),
+            Gives::WindsUp(Winding { n_per_mm, free_n, from_mm, dt_s, creeps, .. }) => {
+                let per_mm_s = slows * most * self.normal;
+                let wound = slows * (free_n / n_per_mm + from_mm) / dt_s;
+                (per_mm_s / (n_per_mm * dt_s), 2.0 * per_mm_s * creeps, wound)
+            }
+        };
+        let solve = |asked: f64, whole: f64| match self.gives {
+            Gives::Creeps { .. } => Used::of(asked.abs(), whole, lag),
+            Gives::WindsUp(_) => Used::by_carter(asked.abs(), whole, lag),
+        };
+        let mut asked = self.asked(self.tread, sine) + wound;
         let per_part = self.yields * self.normal * most;
         let sense = if asked * self.tread < 0.0 { -1.0 } else { 1.0 };
-        let mut whole = most;
-        let mut used = Used::of(asked.abs(), whole, lag);
+        let mut whole = most + winds;
+        let mut used = solve(asked, whole);
         // Against its motion only does a load count for the worm.
         let resists = self.load(sense * used.part * most) > 0.0;
         if resists {
-            let slows = self.inertia * self.advance;
             asked -= slows * self.yields * self.offset_n * sense_of(self.tread);
             whole += slows * per_part;
-            used = Used::of(asked.abs(), whole, lag);
+            used = solve(asked, whole);
         }
         let sense = if asked * self.tread < 0.0 { -1.0 } else { 1.0 };
         if resists && self.yields * self.load(sense * used.part * most) > self.tread.abs() {
             // Brought to rest within the step.
-            (asked, whole) = (self.asked(0.0, sine), most);
-            used = Used::of(asked.abs(), whole, lag);
+            (asked, whole) = (self.asked(0.0, sine) + wound, most + winds);
+            used = solve(asked, whole);
         }
         let utilisation = (self.mu * used.part).copysign(asked);
         let per = used.left / (whole * used.left + lag).max(f64::MIN_POSITIVE);
-        (utilisation, (-utilisation * per * whole / cosine, self.mu * per))
+        // What grows with the cosine sum at the same part of friction.
+        let grows = match self.gives {
+            Gives::Creeps { .. } => utilisation * per * whole,
+            Gives::WindsUp(_) => asked * self.mu * per,
+        };
+        (utilisation, (-grows / cosine, self.mu * per))
     }
 
     /// Speeds at the end with this utilisation.
@@ -118,12 +150,39 @@ impl Grip {
         sine + self.load_n + self.inertia * (self.advance * tread - self.speed)
     }
 
-    /// Speed of the tread over the wall beyond its creep, mm/s.
+    /// Speed of the tread over the wall without what winds it up, mm/s, at this tread's and
+    /// carriage's speed and this traction.
     #[must_use]
-    pub fn slides(&self, ended: &Ended) -> f64 {
-        let slip = (self.advance * ended.tread - ended.speed).abs();
-        let beyond = slip - SLIDES_FROM * self.creep * self.rolling;
-        if beyond > STANDS_BELOW { beyond } else { 0.0 }
+    pub fn creeps(&self, tread: f64, speed: f64, traction_n: f64) -> f64 {
+        match self.gives {
+            Gives::Creeps { .. } => self.advance * tread - speed,
+            Gives::WindsUp(winding) => {
+                let winds = (winding.end(traction_n).mm - winding.from_mm) / winding.dt_s;
+                tread - speed / self.advance - winds
+            }
+        }
+    }
+
+    /// The part of it that is beyond elastic creep, mm/s.
+    #[must_use]
+    pub fn slides(&self, ended: &Ended, utilisation: f64, cosine: f64) -> f64 {
+        let slip =
+            self.creeps(ended.tread, ended.speed, self.traction_n(utilisation, cosine)).abs();
+        let (elastic, slides) = match self.gives {
+            Gives::Creeps { creep, rolling } => (SLIDES_FROM * creep * rolling, true),
+            // Where all friction is used.
+            Gives::WindsUp(Winding { creeps, .. }) => {
+                (2.0 * self.traction_n(self.mu, cosine) * creeps, utilisation.abs() >= self.mu)
+            }
+        };
+        let beyond = slip - elastic;
+        if slides && beyond > STANDS_BELOW { beyond } else { 0.0 }
+    }
+
+    /// Traction at the tread, N, at this utilisation.
+    #[must_use]
+    pub fn traction_n(&self, utilisation: f64, cosine: f64) -> f64 {
+        utilisation * self.normal * cosine
     }
 }
 
@@ -136,11 +195,25 @@ fn sense_of(speed: f64) -> f64 {
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Used {
     part: f64,
-    /// 1 - part, to full precision.
+    /// Derivative of the part by that of the creep's law: of the logarithm 1 - part, to full
+    /// precision.
     left: f64,
 }
 
 impl Used {
+    /// Solves `whole p + lag (1 - sqrt(1 - p)) = asked`, none of them negative; from p = 1 on
+    /// the rest slides.
+    fn by_carter(asked: f64, whole: f64, lag: f64) -> Self {
+        let rest = whole + lag - asked;
+        if rest <= 0.0 {
+            return Self { part: 1.0, left: 0.0 };
+        }
+        // whole r^2 + lag r = rest, r the root of 1 - p.
+        let root = 2.0 * rest / (lag + (lag * lag + 4.0 * whole * rest).sqrt());
+        let root = root.min(1.0);
+        Self { part: 1.0 - root * root, left: 2.0 * root }
+    }
+
     /// Solves `whole p - lag ln(1 - p) = asked`, none of them negative, to a part of 1e-10.
     fn of(asked: f64, whole: f64, lag: f64) -> Self {
         if lag <= 0.0 {
@@ -198,7 +271,18 @@ impl Used {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::plant::wind_up::{Shear, WindUp};
     use proptest::prelude::*;
+
+    /// The nominal tread.
+    fn shear() -> Shear {
+        Shear {
+            n_per_mm: 19.6,
+            relaxation_lengths: 2.255,
+            stiffening: 4.2235,
+            relaxations_s: [0.1059; 2],
+        }
+    }
 
     /// Utilisation and end of a step.
     fn at(grip: &Grip, cosine: f64, sine: f64) -> (f64, Ended) {
@@ -209,8 +293,7 @@ mod tests {
     fn grip() -> Grip {
         Grip {
             mu: 1.1,
-            creep: 0.01,
-            rolling: 8.0,
+            gives: Gives::Creeps { creep: 0.01, rolling: 8.0 },
             load_n: 6.7,
             inertia: 1.0,
             speed: 7.9,
@@ -236,6 +319,18 @@ mod tests {
             prop_assert!(error.abs() <= 1.1e-10 * asked + grain, "{used:?}: {error}");
         }
 
+        #[test]
+        fn carter_solves_its_equation(
+            asked in -9.0f64..6.0, whole in -6.0f64..6.0, lag in -12.0f64..6.0,
+        ) {
+            let [asked, whole, lag] = [asked, whole, lag].map(|exponent| 10f64.powf(exponent));
+            let used = Used::by_carter(asked, whole, lag);
+            prop_assert!((0.0..=1.0).contains(&used.part) && used.left >= 0.0);
+            let over = whole * used.part + lag * (1.0 - 0.5 * used.left) - asked;
+            let error = if used.left > 0.0 { over.abs() } else { over.max(0.0) };
+            prop_assert!(error <= 1e-12 * (whole + lag), "{used:?}: {error}");
+        }
+
         /// What the traction does to tread and carriage takes energy from them, or moves it
         /// between them: none appears.
         #[test]
@@ -245,17 +340,27 @@ mod tests {
         ) {
             let (mass, dt) = (10f64.powf(mass), 10f64.powf(dt));
             let grip = Grip {
-                mu, speed, tread, rolling, load_n: 0.0, inertia: 1e-3 * mass / dt,
+                mu, speed, tread, load_n: 0.0, inertia: 1e-3 * mass / dt,
                 yields: 1000.0 * dt / 2.0, ..grip()
             };
-            let (used, ended) = at(&grip, 30.0, 0.0);
             let kinetic = |v: f64, u: f64| 0.5e-3 * (mass * v * v + 2.0 * u * u);
             let before = kinetic(speed, tread);
-            prop_assert!(kinetic(ended.speed, ended.tread) <= before * (1.0 + 1e-9) + 1e-9);
-            prop_assert!(used.abs() <= mu);
-            // Friction acts against the slip that is left.
-            let slip = ended.tread - ended.speed;
-            prop_assert!(slip * used >= -1e-9 * before);
+            let winding = WindUp::default().over(&shear(), rolling, 6.0, dt);
+            for gives in [Gives::Creeps { creep: 0.01, rolling }, Gives::WindsUp(winding)] {
+                let grip = Grip { gives, ..grip };
+                let (used, ended) = at(&grip, 30.0, 0.0);
+                let traction = grip.traction_n(used, 30.0);
+                let stored = match gives {
+                    Gives::Creeps { .. } => 0.0,
+                    Gives::WindsUp(winding) => winding.end(traction).stored_mj(&shear()),
+                };
+                let after = kinetic(ended.speed, ended.tread) + stored;
+                prop_assert!(after <= before * (1.0 + 1e-9) + 1e-9);
+                prop_assert!(used.abs() <= mu);
+                // Friction acts against the slip that is left.
+                let slip = grip.creeps(ended.tread, ended.speed, traction);
+                prop_assert!(slip * used >= -1e-6 * before);
+            }
         }
     }
 
@@ -264,7 +369,7 @@ mod tests {
         let mut grip = grip();
         let mut tread = 8.0;
         for _ in 0..100 {
-            grip.rolling = tread;
+            grip.gives = Gives::Creeps { creep: 0.01, rolling: tread };
             grip.tread = tread + grip.yields * 6.7 * 1.0;
             let (_, ended) = at(&grip, 33.3, 0.0);
             (tread, grip.speed) = (ended.tread, ended.speed);
@@ -274,7 +379,54 @@ mod tests {
         assert!((used - 1.1 * part).abs() < 1e-6, "{used}");
         let creep = -0.01 * (1.0f64 - part).ln();
         assert!((ended.speed / ended.tread - (1.0 - creep)).abs() < 1e-5, "{ended:?}");
-        assert_eq!(grip.slides(&ended), 0.0);
+        assert_eq!(grip.slides(&ended, used, 33.3), 0.0);
+    }
+
+    #[test]
+    fn a_tread_that_winds_up_carries_the_load_at_its_steady_creep() {
+        let (shear, mut grip, mut wind_up) = (shear(), grip(), WindUp::default());
+        let (mut tread, mut used, mut ended) = (8.0, 0.0, Ended::default());
+        for _ in 0..5000 {
+            let winding = wind_up.over(&shear, tread, 6.0, 1e-3);
+            grip.gives = Gives::WindsUp(winding);
+            grip.tread = tread + grip.yields * 6.7;
+            (used, ended) = at(&grip, 33.3, 0.0);
+            wind_up = winding.end(grip.traction_n(used, 33.3));
+            (tread, grip.speed) = (ended.tread, ended.speed);
+        }
+        assert!((used - 6.7 / 33.3).abs() < 1e-6, "{used}");
+        // Rubber that is 3 mm of travel old on average has relaxed but for this part.
+        let unrelaxed = 0.1059 / (0.1059 + 3.0 / tread);
+        let n_per_mm = shear.n_per_mm * (1.0 + 3.2235 * unrelaxed);
+        let part = used / 1.1;
+        let slides = 2.0 * (1.0 - (1.0 - part).sqrt()) / part;
+        let creep = 6.7 / (n_per_mm * shear.relaxation_lengths * 6.0) * slides;
+        assert!((ended.speed / ended.tread - (1.0 - creep)).abs() < 1e-5, "{ended:?} {creep}");
+        assert!((wind_up.mm - 6.7 / n_per_mm).abs() < 1e-5, "{wind_up:?}");
+        assert_eq!(grip.slides(&ended, used, 33.3), 0.0);
+    }
+
+    #[test]
+    fn a_load_winds_a_wheel_at_rest_up_by_load_over_stiffness() {
+        for load_n in [6.7, -6.7] {
+            let (mut wind_up, mut speed, mut position) = (WindUp::default(), 0.0, 0.0f64);
+            let mut farthest = 0.0f64;
+            for tick in 0..12_000 {
+                let winding = wind_up.over(&shear(), 0.0, 6.0, 1e-3);
+                let gives = Gives::WindsUp(winding);
+                let grip = Grip { gives, tread: 0.0, speed, load_n, ..grip() };
+                let (used, ended) = at(&grip, 33.3, 0.0);
+                wind_up = winding.end(grip.traction_n(used, 33.3));
+                (speed, position) = (ended.speed, position + 1e-3 * ended.speed);
+                farthest = farthest.max(position.abs());
+                assert_eq!(grip.slides(&ended, used, 33.3), 0.0, "{tick}");
+            }
+            let wound = load_n / shear().n_per_mm;
+            assert!((position + wound).abs() < 1e-3, "{position}");
+            assert!((wind_up.mm - wound).abs() < 1e-6, "{wind_up:?}");
+            // It stops ringing, and does not overshoot.
+            assert!(speed.abs() < 1e-6 && farthest < 1.2 * wound.abs(), "{speed} {farthest}");
+        }
     }
 
     #[test]
@@ -283,7 +435,19 @@ mod tests {
         let (used, ended) = at(&grip, 33.3, 0.0);
         assert!((used - 1.1).abs() < 1e-12);
         assert!((ended.speed - (7.9 + 1.1 * 33.3 - 60.0)).abs() < 1e-9);
-        assert!(grip.slides(&ended) > 20.0);
+        assert!(grip.slides(&ended, used, 33.3) > 20.0);
+    }
+
+    #[test]
+    fn what_winds_the_tread_up_to_the_limit_of_friction_is_no_slip() {
+        let before = WindUp::steady(&shear(), 36.0, 8.0, 6.0);
+        let winding = before.over(&shear(), 8.0, 6.0, 1e-3);
+        let grip = Grip { load_n: 60.0, gives: Gives::WindsUp(winding), ..grip() };
+        let (used, ended) = at(&grip, 33.3, 0.0);
+        assert!((used - 1.1).abs() < 1e-12);
+        let wound = winding.end(grip.traction_n(used, 33.3));
+        let (slip, most) = (grip.slides(&ended, used, 33.3), ended.tread - ended.speed);
+        assert!(slip > 0.0 && slip < most - (wound.mm - before.mm) / 1e-3, "{slip} {most}");
     }
 
     #[test]
@@ -296,13 +460,16 @@ mod tests {
             (36.0, 8.0, 0.0),
             (30.0, 0.5, 0.0),
         ] {
-            let grip = Grip { load_n, tread, offset_n, ..grip() };
-            let (c, s, h) = (33.3, 4.0, 1e-5);
-            let used = |c, s| grip.utilisation(c, s).0;
-            let by_cosine = (used(c + h, s) - used(c - h, s)) / (2.0 * h);
-            let by_sine = (used(c, s + h) - used(c, s - h)) / (2.0 * h);
-            let slope = grip.utilisation(c, s).1;
-            assert!((slope.0 - by_cosine).abs() < 1e-6 && (slope.1 - by_sine).abs() < 1e-6);
+            let rigid = Grip { load_n, tread, offset_n, ..grip() };
+            let winding = WindUp::steady(&shear(), 5.0, 8.0, 6.0).over(&shear(), 8.0, 6.0, 1e-3);
+            for grip in [rigid, Grip { gives: Gives::WindsUp(winding), ..rigid }] {
+                let (c, s, h) = (33.3, 4.0, 1e-5);
+                let used = |c, s| grip.utilisation(c, s).0;
+                let by_cosine = (used(c + h, s) - used(c - h, s)) / (2.0 * h);
+                let by_sine = (used(c, s + h) - used(c, s - h)) / (2.0 * h);
+                let slope = grip.utilisation(c, s).1;
+                assert!((slope.0 - by_cosine).abs() < 1e-6 && (slope.1 - by_sine).abs() < 1e-6);
+            }
         }
     }
 
@@ -315,10 +482,14 @@ mod tests {
 
     #[test]
     fn a_weak_motor_is_brought_to_rest_and_not_through_it() {
-        let grip = Grip { load_n: 30.0, tread: 0.1, speed: 0.0, rolling: 0.1, ..grip() };
-        let (_, ended) = at(&grip, 33.3, 0.0);
-        assert_eq!(ended.tread, 0.0);
-        assert!(ended.speed <= 0.0 && ended.speed > -1.0, "{ended:?}");
-        assert!(ended.tread_load_n > 29.0);
+        let creeps = Gives::Creeps { creep: 0.01, rolling: 0.1 };
+        let winding = WindUp::steady(&shear(), 30.0, 0.0, 6.0).over(&shear(), 0.0, 6.0, 1e-3);
+        for gives in [creeps, Gives::WindsUp(winding)] {
+            let grip = Grip { load_n: 30.0, tread: 0.1, speed: 0.0, gives, ..grip() };
+            let (_, ended) = at(&grip, 33.3, 0.0);
+            assert_eq!(ended.tread, 0.0);
+            assert!(ended.speed <= 0.0 && ended.speed > -1.0, "{ended:?}");
+            assert!(ended.tread_load_n > 29.0);
+        }
     }
 }

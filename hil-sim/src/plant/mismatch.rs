@@ -73,6 +73,11 @@ pub struct Mismatch {
     pub friction_waviness: f64,
     /// Length of the waves of the friction: of the order of the distance of two steps.
     pub friction_wave_mm: f64,
+    /// Part of the tread's compliance along the wall that the plant has: 0 none, as the controller
+    /// believes, 1 that of a layer of rubber. Not drawn.
+    pub wind_up: f64,
+    /// Factor of that compliance: compound, and form of the hub.
+    pub wind_up_compliance: f64,
 }
 
 /// A key of [`Mismatch`].
@@ -84,10 +89,18 @@ pub struct Field {
     pub neutral: f64,
     /// Values that it takes.
     pub range: (f64, f64),
-    /// Range of the wide draw.
+    /// Range of the wide draw; of no width: it is not drawn.
     pub wide: (f64, f64),
     /// Its place.
     of: fn(&mut Mismatch) -> &mut f64,
+}
+
+impl Field {
+    /// Whether the wide draw draws it.
+    #[must_use]
+    pub fn is_drawn(&self) -> bool {
+        self.wide.0 < self.wide.1
+    }
 }
 
 /// One line a key: neutral value, range, range of the wide draw.
@@ -135,6 +148,8 @@ fields! {
     screw_friction: 0.0, (0.0, 0.2), (0.0, 0.05);
     friction_waviness: 0.0, (0.0, 0.5), (0.0, 0.1);
     friction_wave_mm: 22.0, (2.0, 200.0), (11.0, 44.0);
+    wind_up: 0.0, (0.0, 1.0), (0.0, 0.0);
+    wind_up_compliance: 1.0, (0.1, 3.0), (0.7, 1.4);
 }
 
 impl Mismatch {
@@ -155,7 +170,7 @@ impl Mismatch {
                 low + (high - low) * part
             };
             let place = (field.of)(&mut drawn);
-            if *place == field.neutral {
+            if field.is_drawn() && *place == field.neutral {
                 *place = value;
             }
         }
@@ -202,6 +217,7 @@ impl PlantParameters {
         });
         (self.screw_droop, self.screw_friction) = (mismatch.screw_droop, mismatch.screw_friction);
         self.friction_waves = (mismatch.friction_waviness, mismatch.friction_wave_mm);
+        self.wind_up = (mismatch.wind_up, mismatch.wind_up_compliance);
         self.run_out_mm = mismatch.run_out_mm;
         self.backlash_mm = mismatch.backlash_mm;
         self.pivot_friction_n = mismatch.pivot_friction_n;
@@ -240,7 +256,7 @@ mod tests {
         for field in FIELDS {
             let mut mismatch = Mismatch::default();
             // One end of the range may be neutral.
-            let (low, high) = field.wide;
+            let (low, high) = if field.is_drawn() { field.wide } else { field.range };
             *(field.of)(&mut mismatch) = if high == field.neutral { low } else { high };
             assert_ne!(nominal.clone().with_mismatch(&mismatch), nominal, "{}", field.name);
         }
@@ -263,12 +279,18 @@ mod tests {
         assert_eq!(draws[4], set.draw(5, &[]));
         for (index, field) in FIELDS.iter().enumerate() {
             let (low, high) = field.wide;
-            assert!(field.range.0 <= low && low < high && high <= field.range.1);
+            assert!(field.range.0 <= low && low <= high && high <= field.range.1);
             let values = draws.iter().map(|draw| draw.values().nth(index).unwrap().1);
-            if field.name == "backlash_mm" {
-                assert!(values.into_iter().all(|value| value == 0.4));
+            let stays = match field.name {
+                "backlash_mm" => Some(0.4),
+                "wind_up" => Some(0.0),
+                _ => None,
+            };
+            if let Some(stays) = stays {
+                assert!(values.into_iter().all(|value| value == stays), "{}", field.name);
                 continue;
             }
+            assert!(low < high);
             let (least, most) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| {
                 assert!((low..=high).contains(&x), "{}: {x}", field.name);
                 (a.min(x), b.max(x))

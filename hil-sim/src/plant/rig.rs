@@ -18,6 +18,7 @@ use super::ledger::Ledger;
 use super::play::{Pivot, Play};
 use super::ring::Ring;
 use super::rolling::{self, Steady};
+use super::wind_up::WindUp;
 use contact::SettleTimer;
 use traction::Stride;
 
@@ -100,6 +101,10 @@ pub struct VirtualRig {
     /// Load on the tread by what the elements take up beyond the work of the contact's
     /// resultants, N, signed as its motion.
     inner_load_n: f64,
+    /// Displacement of the tread along the wall against the wheel.
+    wind_up: WindUp,
+    /// Length of the contact, mm.
+    contact_mm: f64,
     /// Sliding bodily over the wall.
     sliding: bool,
     /// Held by the stop or latch that carries the load until the drive first turns.
@@ -198,6 +203,8 @@ impl VirtualRig {
             },
             energy: Energy::default(),
             inner_load_n: 0.0,
+            wind_up: WindUp::default(),
+            contact_mm: 1.0,
             sliding: false,
             latched: true,
             rolled_mm_s: 0.0,
@@ -339,6 +346,7 @@ impl VirtualRig {
         let (truth, settle_timer, latched) = (self.truth, self.settle_timer, self.latched);
         let (_, cosine, sine) = self.forces;
         let stride = self.predict(drives, dt_s);
+        let wound_mj = self.wind_up.stored_mj(&self.parameters.shear());
         if !stride.tread_mm_s.is_finite() {
             return Err(PlantError::NotFinite { time_s: truth.time_s, name: "tread speed" });
         }
@@ -358,7 +366,7 @@ impl VirtualRig {
             self.roll_steadily(&local, stride, finer)?
         };
         if done {
-            self.book(&truth, (cosine, sine), drives, &stride);
+            self.book(&truth, (cosine, sine), wound_mj, drives, &stride);
         } else {
             (self.truth, self.settle_timer, self.latched) = (truth, settle_timer, latched);
         }

@@ -14,7 +14,7 @@
 mod complementarity;
 mod coupled;
 mod law;
-mod layer;
+pub(super) mod layer;
 mod layout;
 mod parameters;
 mod resultants;

@@ -173,7 +173,7 @@ fn mismatch() -> Vec<(String, String)> {
     let described = fields::<Mismatch>("mismatch").into_iter().zip(FIELDS);
     let with_range = |((key, text), field): ((String, String), &Field)| {
         let (from, to) = field.wide;
-        (key, format!("{text} Wide {from} to {to}."))
+        (key, if field.is_drawn() { format!("{text} Wide {from} to {to}.") } else { text })
     };
     described.map(with_range).collect()
 }

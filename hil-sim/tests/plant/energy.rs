@@ -85,3 +85,21 @@ fn the_drives_work_is_found_again_with_a_wheel_off_its_axis() {
         }
     }
 }
+
+#[test]
+fn the_drives_work_is_found_again_with_a_tread_that_winds_up() {
+    for (preset, speed, preload) in [
+        ("prototype", 8.0, 33.3),
+        ("prototype", 25.0, 48.0),
+        ("prototype", -8.0, 33.3),
+        ("prototype", -25.0, 33.3),
+        ("fe", 12.0, 100.0),
+    ] {
+        for compliance in [0.3, 1.0, 2.0] {
+            let mut plant = nominal(preset);
+            plant.wind_up = (1.0, compliance);
+            let part = missing(finer(plant), speed, preload, 80.0, 3);
+            assert!(part.abs() < 3e-3, "{speed} mm/s, {preload} N, {compliance}: {part}");
+        }
+    }
+}

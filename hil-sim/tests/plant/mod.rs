@@ -11,3 +11,4 @@ mod precision;
 mod sensors;
 mod skipping;
 mod spread;
+mod wind_up;

@@ -4,16 +4,17 @@ use super::traction::{Moves, Stride};
 use super::{Drives, Truth, VirtualRig};
 
 impl VirtualRig {
-    /// Books a stride that began with this truth and these cosine and sine sums, N. The axial
-    /// forces of its end act over the travel by its mean speeds, as the step of time has it.
+    /// Books a stride that began with this truth, these cosine and sine sums, N, and this energy
+    /// of the wound-up tread, mJ. The axial forces of its end act over the travel by its mean speeds, as the step of time has it.
     pub(super) fn book(
         &mut self,
         before: &Truth,
         from_n: (f64, f64),
+        wound_mj: f64,
         drives: &Drives,
         stride: &Stride,
     ) {
-        let (normal, cosine, sine) = self.forces;
+        let (_, cosine, sine) = self.forces;
         let (p, truth) = (&self.parameters, &self.truth);
         let travel = self.mean(before.speed_mm_s, truth.speed_mm_s) * stride.dt_s;
         let rolled = self.mean(before.tread_mm_s, truth.tread_mm_s) * stride.dt_s;
@@ -32,7 +33,7 @@ impl VirtualRig {
             advance * before.tread_mm_s - before.speed_mm_s,
             advance * truth.tread_mm_s - truth.speed_mm_s,
         ) * stride.dt_s;
-        let traction_n = truth.utilisation * (normal * part - self.eccentric_lever());
+        let traction_n = truth.utilisation * self.lever_n();
         let kinetic =
             p.mass_kg * truth.speed_mm_s.powi(2) + p.drive.mass_kg * truth.tread_mm_s.powi(2);
         let spring = 0.5 * (before.preload_n + self.preload_now());
@@ -51,7 +52,8 @@ impl VirtualRig {
             energy.gear_mj += p.drive.friction_n * rolled.abs();
         }
         energy.worm_mj += (-(traction_n + offset_n) * rolled - inner_mj).max(0.0);
-        energy.creep_mj += traction_n / advance * slip;
+        energy.wound_mj = self.wind_up.stored_mj(&p.shear());
+        energy.creep_mj += traction_n / advance * slip - (energy.wound_mj - wound_mj);
         energy.contact_mj += given_mj;
         energy.tread_mj += taken_mj;
         energy.load_mj += p.load_n * travel;

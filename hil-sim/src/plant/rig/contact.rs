@@ -215,6 +215,8 @@ impl VirtualRig {
             self.truth.depth_mm = solved.contact.depth_mm;
             let contact = &solved.contact;
             self.forces = (contact.normal_n, contact.cosine_n, contact.sine_n);
+            self.contact_mm = contact.area_mm2 / self.parameters.ring.width_mm;
+            self.wind_steadily();
         }
     }
 
@@ -280,6 +282,9 @@ impl VirtualRig {
             (solved.height_mm - self.parameters.ring.radius_mm).max(0.0)
         };
         self.forces = (contact.normal_n, contact.cosine_n, contact.sine_n);
+        if contact.area_mm2 > 0.0 {
+            self.contact_mm = contact.area_mm2 / self.parameters.ring.width_mm;
+        }
         let lift = solved.height_mm - self.parameters.ring.radius_mm;
         let (seat, added) = self.pressing(local);
         let spring = (seat + self.parameters.spring_n_per_mm * lift).max(0.0);

@@ -4,8 +4,9 @@
 use super::{Drives, VirtualRig};
 use crate::plant::actuators::Turn;
 use crate::plant::balance::{Axial, Solved};
-use crate::plant::grip::Grip;
+use crate::plant::grip::{Gives, Grip};
 use crate::plant::ring::Contact;
+use crate::plant::wind_up::WindUp;
 
 /// Carrying less of its friction than this part for radial load, a wheel that spins at an
 /// end stop is as good as jammed by the arm: it stands.
@@ -14,8 +15,8 @@ const JAMMED_BELOW: f64 = 0.25;
 /// Travel over which the wheel's rise is learned, mm.
 const LEARNING_MM: f64 = 1.0;
 
-/// Travel over which a tread takes up another rolling motion, mm: the relaxation length of a
-/// tyre, here much less than the patch.
+/// Travel over which a tread that is rigid along the wall takes up another rolling motion, mm.
+/// Chosen.
 const RELAXATION_MM: f64 = 0.1;
 
 /// Largest distance of a stride's end from its prediction, mm.
@@ -50,6 +51,7 @@ pub(super) struct Stride {
     predicted: (f64, f64),
     /// An end stop holds the carriage.
     stopped: bool,
+    gives: Gives,
 }
 
 impl Stride {
@@ -97,14 +99,23 @@ impl VirtualRig {
                 p.drive.turn(tread, drives.drive, on, load_n, dt_s)
             }
         };
-        if turn.free_mm_s != 0.0 {
+        let shear = p.shear();
+        if turn.free_mm_s != 0.0 && self.latched {
             self.latched = false;
+            if shear.gives_way() {
+                // The latch lets go as the tread takes over the load.
+                self.wind_up = WindUp::steady(&shear, p.load_n, 0.0, self.contact_mm);
+            }
         }
         let (normal, cosine, sine) = self.forces;
+        let rolling = self.imposed_speed_mm_s.unwrap_or(tread).abs();
         let grip = Grip {
             mu: p.friction_at(self.truth.position_mm),
-            creep: p.elastic_creep,
-            rolling: self.imposed_speed_mm_s.unwrap_or(tread).abs(),
+            gives: if shear.gives_way() {
+                Gives::WindsUp(self.wind_up.over(&shear, rolling, self.contact_mm, dt_s))
+            } else {
+                Gives::Creeps { creep: p.elastic_creep, rolling }
+            },
             load_n: p.load_n,
             inertia: 1e-3 * p.mass_kg / dt_s,
             speed: self.truth.speed_mm_s,
@@ -112,11 +123,7 @@ impl VirtualRig {
             yields: turn.yields,
             advance: self.rolling_part() * self.advance - self.eccentric().1 / p.ring.radius_mm,
             offset_n: self.offset_load_n(),
-            normal: if cosine > 0.0 {
-                (self.rolling_part() * normal - self.eccentric_lever()) / cosine
-            } else {
-                self.rolling_part()
-            },
+            normal: if cosine > 0.0 { self.lever_n() / cosine } else { self.rolling_part() },
         };
         let predicted = self.predict_speeds(&grip);
         let mut stride = Stride {
@@ -129,6 +136,7 @@ impl VirtualRig {
             turn,
             predicted,
             stopped: false,
+            gives: grip.gives,
         };
         if self.latched {
             return stride;
@@ -198,6 +206,10 @@ impl VirtualRig {
     /// Books the stride with the contact that was found for it.
     pub(super) fn complete(&mut self, stride: &Stride) {
         let (normal, cosine, sine) = self.forces;
+        let traction_n = match stride.moves {
+            Moves::Driven(grip) => grip.traction_n(self.truth.utilisation, cosine),
+            _ => self.truth.utilisation * self.lever_n(),
+        };
         let truth = &mut self.truth;
         let before = truth.tread_mm_s;
         let (mut tread_load_n, mut sliding) = (0.0, 0.0);
@@ -214,7 +226,7 @@ impl VirtualRig {
                 truth.speed_mm_s = if stride.stopped { 0.0 } else { ended.speed };
                 truth.tread_mm_s = ended.tread;
                 tread_load_n = ended.tread_load_n;
-                sliding = grip.slides(&ended);
+                sliding = grip.slides(&ended, truth.utilisation, cosine);
                 self.play.pushed(truth.utilisation * cosine, ended.tread);
             }
             Moves::Free(grip) => {
@@ -237,19 +249,39 @@ impl VirtualRig {
         );
         let rolled = self.mean(before, tread) * stride.dt_s;
         let dt_s = stride.dt_s;
-        let taken_up = -(-rolled.abs() / RELAXATION_MM).exp_m1();
+        let taken_up = match stride.gives {
+            Gives::Creeps { .. } => -(-rolled.abs() / RELAXATION_MM).exp_m1(),
+            Gives::WindsUp(_) => 1.0,
+        };
         self.advance += taken_up * (self.advance() - self.advance);
         self.sliding = sliding > 0.0;
         self.tread_load_n = tread_load_n;
         let truth = &mut self.truth;
         truth.slip_mm += sliding * dt_s;
-        let rolls = match stride.moves {
-            Moves::Driven(grip) | Moves::Free(grip) => grip.advance,
-            Moves::Latched | Moves::Spins(_) => 1.0,
+        let (tread, speed) = (truth.tread_mm_s, truth.speed_mm_s);
+        let creep = match stride.moves {
+            Moves::Driven(grip) | Moves::Free(grip) => grip.creeps(tread, speed, traction_n),
+            Moves::Latched | Moves::Spins(_) => tread - speed,
         };
-        let creep = (rolls * truth.tread_mm_s - truth.speed_mm_s).abs() * dt_s;
-        truth.wear_mj += truth.utilisation.abs() * normal * creep;
+        truth.wear_mj += truth.utilisation.abs() * normal * (creep.abs() * dt_s);
         truth.work_mj += (stride.motor_force_n(tread_load_n) * rolled).max(0.0);
+        if let Gives::WindsUp(winding) = stride.gives {
+            self.wind_up = winding.end(traction_n);
+        }
+    }
+
+    /// Winds the tread up as it is in steady rolling against the load.
+    pub(super) fn wind_steadily(&mut self) {
+        let (shear, speed) = (self.parameters.shear(), self.truth.tread_mm_s.abs());
+        if shear.gives_way() {
+            self.wind_up = WindUp::steady(&shear, self.thrust_n, speed, self.contact_mm);
+        }
+    }
+
+    /// Lever of the friction, as normal force, N: traction at the tread is its part by the
+    /// utilisation.
+    pub(super) fn lever_n(&self) -> f64 {
+        self.rolling_part() * self.forces.0 - self.eccentric_lever()
     }
 
     /// Torque of the normal pressure, as load on the drive, N: of a rim whose axis lies ahead of

@@ -42,6 +42,29 @@ fn mode_compliance(radius_mm: f64, thickness_mm: f64, waves: usize) -> f64 {
     if waves == 0 {
         return 0.0;
     }
+    let [outward, _] = displacement(radius_mm, thickness_mm, waves, [0.0, -1.0]);
+    -outward
+}
+
+/// Displacement of the rim along itself per shear traction over shear modulus, mm, both of
+/// `waves` waves around it; without waves the rim turns on the hub.
+#[cfg(test)]
+pub(in crate::plant) fn shear_compliance(radius_mm: f64, thickness_mm: f64, waves: usize) -> f64 {
+    if waves == 0 {
+        let hub = 1.0 - thickness_mm / radius_mm;
+        return 0.5 * radius_mm * (1.0 / (hub * hub) - 1.0);
+    }
+    displacement(radius_mm, thickness_mm, waves, [1.0, 0.0])[1]
+}
+
+/// Displacement of the rim outwards and along itself, mm, by this shear and normal stress over
+/// shear modulus, of `waves` waves around it, at least 1.
+fn displacement(
+    radius_mm: f64,
+    thickness_mm: f64,
+    waves: usize,
+    [shear, normal]: [f64; 2],
+) -> [f64; 2] {
     let n = waves as f64;
     let hub = 1.0 - thickness_mm / radius_mm;
     // Value and two derivatives of each part of f, and its pressure over the modulus at the
@@ -77,11 +100,11 @@ fn mode_compliance(radius_mm: f64, thickness_mm: f64, waves: usize) -> f64 {
     let columns = [0, 1, 2, 3].map(column);
     let scales = columns.map(|c| c.amax());
     let matrix = Matrix4::from_columns(&[0, 1, 2, 3].map(|j| columns[j] / scales[j]));
-    let solved = matrix.lu().solve(&Vector4::new(0.0, 0.0, 0.0, -1.0));
+    let solved = matrix.lu().solve(&Vector4::new(0.0, 0.0, shear, normal));
     // Singular at no thickness alone: nothing moves.
     let solved = solved.unwrap_or_else(Vector4::zeros);
-    let outward: f64 = (0..4).map(|j| solved[j] / scales[j] * at_rim[j][0]).sum();
-    -outward * n * radius_mm
+    let sum = |of: usize| (0..4).map(|j| solved[j] / scales[j] * at_rim[j][of]).sum::<f64>();
+    [sum(0) * n * radius_mm, -sum(1) * radius_mm]
 }
 
 /// Inward displacement of an element by a pressure over shear modulus on another, mm, by
@@ -111,7 +134,7 @@ pub(super) fn compliance(radius_mm: f64, thickness_mm: f64, elements: usize) -> 
 
 /// Shear modulus over k_inf, mm: with it the relaxed gap at the calibration's point is that of
 /// independent elements.
-pub(super) fn modulus_mm(parameters: &RingParameters) -> f64 {
+pub(in crate::plant) fn modulus_mm(parameters: &RingParameters) -> f64 {
     let (radius, thickness) = (parameters.radius_mm, parameters.tread_thickness_mm);
     let pitch = TAU / FINE as f64;
     // The elements that face the step ahead and the wall under the centre.
