@@ -144,8 +144,7 @@ impl Tread {
         state.frame.position = position.to_bits().saturating_mul(64);
         let wall = if on_top { self.height } else { 0 };
         state.frame.centre = self.radius + wall;
-        // No time, all time: the height of the relaxed tread, from outside.
-        let still = Stride::new(i32::MAX, self.excess);
+        let still = Stride::RELAXED;
         for _ in 0..12 {
             let facets = self.facets(&state.frame);
             let sums = self.sums(state, &still, facets);

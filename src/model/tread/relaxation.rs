@@ -51,6 +51,10 @@ impl Stride {
         }
     }
 
+    /// All the time that there is.
+    pub(super) const RELAXED: Self =
+        Self { keeps: 0, takes: i32::MAX, took: 0, loads: 1 << 26, relieves: 0, relieved: 0 };
+
     /// Duration over relaxation time, Q23, saturating below 256.
     pub(super) fn ratio(duration: Seconds, per_tau: Q16) -> i32 {
         let product = i64::from(duration.to_bits()) * i64::from(per_tau.to_bits());

@@ -1,62 +1,114 @@
 use super::*;
-use crate::model::rollout::{Run, roll};
+use crate::model::rollout::{LiftOff, Run, roll};
 use crate::rig::Rig;
+use proptest::prelude::*;
 
-#[test]
-fn prints() {
-    let rig = Rig::prototype();
-    let tread = Tread::try_build(&rig).unwrap();
+/// A wheel of the prototype rolled over a step at constant speed, mm/s, and force, N.
+fn rolled(direction: Direction, load: Option<f64>, scale: f64, speed: f64, force: f64) -> LiftOff {
+    let tread = Tread::try_build(&Rig::prototype()).expect("a sound rig");
+    let (from, until) = match direction {
+        Direction::Deploy => (q16(-38_000_000), Q16::ZERO),
+        Direction::Retract => (q16(25_000_000), q16(-14_000_000)),
+    };
+    let axial = load.map_or(Axial::Pushed, |load| Axial::Driven(Q16::from_num(load)));
+    let scale = Q16::from_num(scale);
+    let run = Run { direction, axial, scale, level: true, from, until };
     let mut state = TreadState::default();
-    for (direction, axial, v, p, exact) in [
-        (Direction::Deploy, Axial::Pushed, 8.0, 48.0, 2.4560),
-        (Direction::Deploy, Axial::Driven(q16(6_700_000)), 8.0, 48.0, 2.6459),
-        (Direction::Deploy, Axial::Driven(q16(6_700_000)), 30.0, 60.0, 2.6989),
-        (Direction::Retract, Axial::Pushed, 8.0, 48.0, 2.0783),
-        (Direction::Retract, Axial::Driven(q16(6_700_000)), 8.0, 48.0, 2.2289),
+    roll(&tread, &mut state, &run, |_| (Q16::from_num(speed), Q16::from_num(force))).lift
+}
+
+/// Gap and friction needed of a ring with 2,880 elements and strides of 0.01 mm.
+#[test]
+fn a_crossing_is_that_of_a_fine_ring() {
+    use Direction::{Deploy, Retract};
+    for (direction, load, speed, force, gap, used) in [
+        (Deploy, None, 8.0, 48.0, 2.4560, 0.0),
+        (Deploy, None, 15.0, 48.0, 2.5737, 0.0),
+        (Deploy, Some(6.7), 8.0, 48.0, 2.6459, 0.812),
+        (Deploy, Some(6.7), 30.0, 60.0, 2.6989, 0.757),
+        (Deploy, Some(6.7), 1.0, 33.0, 2.5137, 0.889),
+        (Retract, None, 8.0, 48.0, 2.0783, 0.0),
+        (Retract, Some(6.7), 8.0, 48.0, 2.2289, 0.748),
+        (Retract, Some(6.7), 15.0, 48.0, 2.2857, 0.753),
+        (Retract, Some(6.7), 100.0, 150.0, 1.9792, 0.580),
     ] {
-        let (from, until) = match direction {
-            Direction::Deploy => (q16(-38_000_000), q16(10_000_000)),
-            Direction::Retract => (q16(25_000_000), q16(-25_000_000)),
-        };
-        let run = Run { direction, axial, scale: Q16::ONE, level: true, from, until };
-        let got = roll(&tread, &mut state, &run, |_| (Q16::from_num(v), Q16::from_num(p)));
-        let gap: f64 = got.lift.gap.to_num();
-        println!(
-            "{direction:?} {axial:?} {v} {p}: {gap:.4} {:+.2} % {got:?}",
-            100.0 * (gap / exact - 1.0)
-        );
+        let got = rolled(direction, load, 1.0, speed, force);
+        let off = got.gap.to_num::<f64>() / gap - 1.0;
+        assert!(off.abs() < 0.007, "{direction:?} {load:?} {speed} {force}: {off}");
+        let off = got.utilisation.to_num::<f64>() - used;
+        assert!(off.abs() < 0.02, "{direction:?} {load:?} {speed} {force}: {off}");
     }
 }
+
+/// `N = 4/3 k L sqrt(2R) c^(3/2)` of a relaxed ring.
 #[test]
-fn prints_pivot() {
+fn a_wheel_that_is_put_down_sinks_in_as_far_as_its_relaxed_tread_carries() {
     let rig = Rig::prototype();
-    let tread = Tread::try_build(&rig).unwrap();
-    let mut state = TreadState::default();
-    for level in [true, false] {
-        for from in [25.0, 5.0, 1.2] {
-            for v in [21.1, 24.1] {
-                let run = Run {
-                    direction: Direction::Retract,
-                    axial: Axial::Driven(q16(6_666_666)),
-                    scale: Q16::ONE,
-                    level,
-                    from: Q16::from_num(from),
-                    until: q16(-14_000_000),
-                };
-                let mut n = 0;
-                let mut xs = std::vec::Vec::new();
-                let got = roll(&tread, &mut state, &run, |x| {
-                    n += 1;
-                    if n % 8 == 0 {
-                        xs.push(x.to_num::<f32>());
-                    }
-                    (Q16::from_num(v), q16(52_700_000))
-                });
-                println!(
-                    "{level} {from} {v}: gap {} x {} y {} strides {n} {xs:?}",
-                    got.lift.gap, got.lift.position, got.lift.centre
-                );
-            }
+    let tread = Tread::try_build(&rig).expect("a sound rig");
+    let width = 1e-9 * rig.tread.k_inf_pa_per_m * rig.rig.wheel_width_mm;
+    let rate = 4.0 / 3.0 * width * (2.0 * rig.rig.wheel_radius_mm).sqrt();
+    for (position, wall) in [(-30.0, 0.0), (20.0, 4.0)] {
+        for force in [15.0, 48.0, 120.0] {
+            let mut state = TreadState::default();
+            let drive = Drive {
+                direction: Direction::Deploy,
+                axial: Axial::Pushed,
+                pressed: Q16::from_num(force),
+                duration: Q16::ZERO,
+                scale: Q16::ONE,
+                level: true,
+            };
+            tread.put_down(&mut state, Q16::from_num(position), &drive);
+            let centre = f64::from(state.frame.centre) / f64::from(1 << 22);
+            let compression = rig.rig.wheel_radius_mm + wall - centre;
+            let exact = (force / rate).powf(2.0 / 3.0);
+            assert!((compression / exact - 1.0).abs() < 5e-3, "{compression} {exact}");
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+
+    #[test]
+    fn a_stiffer_tread_a_faster_wheel_or_less_force_opens_the_gap(
+        back in any::<bool>(),
+        speed in 3.0..20.0f64,
+        force in 25.0..100.0f64,
+    ) {
+        let direction = if back { Direction::Retract } else { Direction::Deploy };
+        let gap = |scale: f64, speed: f64, force: f64| {
+            rolled(direction, Some(6.7), scale, speed, force).gap.to_num::<f64>()
+        };
+        let at = gap(1.0, speed, force);
+        prop_assert!(gap(1.2, speed, force) > at * 1.005);
+        prop_assert!(gap(1.0, 2.0 * speed, force) > at);
+        prop_assert!(gap(1.0, speed, 0.8 * force) > at * 1.005);
+    }
+
+    /// No force, no speed and no stiffness makes it overflow or panic.
+    #[test]
+    fn whatever_is_asked_the_wheel_stays_within_its_height(
+        back in any::<bool>(),
+        pressed in any::<i32>(),
+        duration in any::<i32>(),
+        scale in any::<i32>(),
+        load in any::<i32>(),
+    ) {
+        let tread = Tread::try_build(&Rig::prototype()).expect("a sound rig");
+        let mut state = TreadState::default();
+        let drive = Drive {
+            direction: if back { Direction::Retract } else { Direction::Deploy },
+            axial: Axial::Driven(Q16::from_bits(load)),
+            pressed: Q16::from_bits(pressed),
+            duration: Q16::from_bits(duration),
+            scale: Q16::from_bits(scale),
+            level: false,
+        };
+        tread.put_down(&mut state, q16(-16_000_000), &drive);
+        for _ in 0..200 {
+            let contact = tread.advance(&mut state, &drive);
+            prop_assert!(contact.centre.abs() < q16(100_000_000), "{contact:?}");
         }
     }
 }
