@@ -1,16 +1,16 @@
 //! The tread, rolled out: a viscoelastic ring over a step, in fixed point. The one place in the
 //! controller that knows rubber.
 //!
-//! Elements lie along rays from the wheel's centre, [`rays::PITCH`] apart. A stride rolls the
+//! Elements lie along rays from the wheel's centre, 0.008 rad apart. A stride rolls the
 //! tread on by one of them. An element at depth d carries the pressure of the three-parameter
-//! solid ([`relaxation`]), never a tension; the centre is where the contact carries what presses
+//! solid (`relaxation`), never a tension; the centre is where the contact carries what presses
 //! the wheel. Only elements in contact are visited; those that leave it are fresh when they
 //! return.
 //!
 //! Equations, with c and s the sums of `p cos` and `p sin` over the contact: pushed `c = N`; driven
 //! by torque against an axial load G `c + u s = N` with the utilisation `u = (G + s) / c`. One
 //! step of Newton's method a stride, whose remainder the next stride makes good. The axle moves
-//! `sqrt(ds^2 - dy^2)` while the tread rolls ds (FACTS: rolling over an edge), or as far as the
+//! `sqrt(ds^2 - dy^2)` while the tread rolls ds (docs/PLANT.md, rolling), or as far as the
 //! tread where that is asked for.
 //!
 //! Source: Lee and Radok 1960 for the solid; the rolling scheme is this project's own.

@@ -4,17 +4,17 @@
 use plotters::style::RGBColor;
 
 pub const TRUTH: RGBColor = RGBColor(0x1f, 0x29, 0x37);
-/// References; drawn dashed, see [`DASHES`].
+/// References; drawn dashed, see `DASHES`.
 pub(crate) const WANTED: RGBColor = RGBColor(0x6b, 0x72, 0x80);
-/// Limits; drawn dashed, see [`DASHES`].
+/// Limits; drawn dashed, see `DASHES`.
 pub(crate) const LIMIT: RGBColor = RGBColor(0xb9, 0x1c, 0x1c);
 
-/// First touch of a corner; drawn dashed, see [`DASHES`].
+/// First touch of a corner; drawn dashed, see `DASHES`.
 pub(crate) const TOUCH: RGBColor = RGBColor(0xb4, 0x53, 0x09);
 /// Face of a step.
 pub(crate) const FACE: RGBColor = RGBColor(0x64, 0x74, 0x8b);
 
-/// Simulated by the reference models; drawn dashed, see [`DASHES`].
+/// Simulated by the reference models; drawn dashed, see `DASHES`.
 pub const SIMULATED: RGBColor = RGBColor(0x1c, 0x6f, 0xd6);
 
 pub const SPEED: RGBColor = RGBColor(0x1d, 0x7f, 0xe0);
