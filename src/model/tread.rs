@@ -23,13 +23,17 @@ mod rays;
 mod relaxation;
 mod state;
 
-use crate::numeric::{divide, high, sqrt};
+use crate::numeric::{between, divide, high, sqrt};
 use crate::units::{Direction, Millimetres, Newtons, Q16, Ratio, Seconds, q16};
 use rays::{AHEAD, BEHIND, ray};
 use relaxation::Stride;
 
 pub use state::TreadState;
 use state::{Element, Frame, Patch};
+
+/// Farthest from the face that a wheel is put down, mm: 200 strides of the largest wheel further it
+/// is still within the format.
+const FARTHEST: Millimetres = q16(200_000_000);
 
 /// Largest change of the centre's height in a stride over the stride: steeper than any step that
 /// a wheel can climb.
@@ -141,7 +145,7 @@ impl Tread {
     pub fn put_down(&self, state: &mut TreadState, position: Millimetres, drive: &Drive) {
         state.clear();
         let on_top = position >= Q16::ZERO;
-        state.frame.position = position.to_bits().saturating_mul(64);
+        state.frame.position = between(position, -FARTHEST, FARTHEST).to_bits() << 6;
         let wall = if on_top { self.height } else { 0 };
         state.frame.centre = self.radius + wall;
         let still = Stride::RELAXED;
@@ -150,7 +154,8 @@ impl Tread {
             let sums = self.sums(state, &still, facets);
             let change = self.correction(&sums, &still, drive).1;
             let change = if sums.visits == 0 { q16(-100_000) } else { change };
-            state.frame.centre += change.to_bits().clamp(-10_000, 10_000) << 6;
+            let change = change.to_bits().clamp(-10_000, 10_000) << 6;
+            state.frame.centre = self.held(state.frame.centre + change);
         }
         let facets = self.facets(&state.frame);
         self.commit(state, &still, facets);
@@ -165,8 +170,9 @@ impl Tread {
             patch.turn(forward);
         }
         let travel = self.travel(state, drive);
-        state.frame.position += if forward { travel } else { -travel };
-        state.frame.centre += state.frame.climb;
+        let travel = if forward { travel } else { -travel };
+        state.frame.position = state.frame.position.saturating_add(travel);
+        state.frame.centre = self.held(state.frame.centre + state.frame.climb);
         let stride = Stride::new(Stride::ratio(drive.duration, self.per_tau), self.excess);
         let facets = self.facets(&state.frame);
         let sums = self.sums(state, &stride, facets);
@@ -175,7 +181,7 @@ impl Tread {
         let change = if sums.visits == 0 { -steepest / 4 } else { change.to_bits() << 6 };
         let change = change.clamp(-steepest, steepest);
         state.frame.climb = (state.frame.climb + change).clamp(-steepest, steepest);
-        state.frame.centre += change;
+        state.frame.centre = self.held(state.frame.centre + change);
         let facets = self.facets(&state.frame);
         self.commit(state, &stride, facets);
         let floor = if sums.floor > i32::MIN {
@@ -190,6 +196,18 @@ impl Tread {
             floor,
             visits: sums.visits,
             ..contact
+        }
+    }
+
+    /// A height of the centre, within those that a wheel on either wall can have, mm, Q22.
+    const fn held(&self, centre: i32) -> i32 {
+        let (least, most) = (self.radius / 2, self.radius + self.radius / 4 + self.height);
+        if centre < least {
+            least
+        } else if centre > most {
+            most
+        } else {
+            centre
         }
     }
 
