@@ -6,7 +6,6 @@ pub mod dip;
 pub mod effective_stiffness;
 pub mod formula;
 pub mod guard;
-pub mod history;
 pub mod impact;
 mod plan;
 pub mod planner;

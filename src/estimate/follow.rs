@@ -56,7 +56,6 @@ impl Estimator {
     pub fn follow(&self, state: &mut EstimateState, tick: &Follow<'_>) -> Findings {
         let mut found = Findings::default();
         let direction = state.direction;
-        state.history.step(self.stride, direction, tick.sensed.travel, tick.pressed);
         self.watch_slip(state, tick, &mut found);
         let seen = self.watch_input(state, tick.sensed);
         let event = self.watch.step(&mut state.watch, direction, &seen);
@@ -295,8 +294,6 @@ impl Estimator {
             at: tick.now,
             position: state.position,
             gap: lift.gap,
-            history: *state.history.history(),
-            distance: lift.distance,
             speed: state.crossing_speed.speed(FILTER_LAG, sensed.speed.value),
             held: sensed.speed.value,
             preload: sensed.preload_filtered,

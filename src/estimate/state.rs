@@ -8,7 +8,6 @@ use super::tread::{Shown, TreadState};
 use super::{CornerSlip, Place, Position, PositionConfidence};
 use crate::fault::{Fault, Limit};
 use crate::model::LimitedBy;
-use crate::model::history::{History, HistoryWriter};
 use crate::numeric::LowPassState;
 use crate::units::{
     Direction, Millimetres, MillimetresPerSecond, Newtons, Q16, Ratio, Tick, Travel, q16,
@@ -28,7 +27,6 @@ pub struct EstimateState {
     /// Crossing watch.
     pub watch: WatchState,
     pub(super) tread: TreadState,
-    pub(super) history: HistoryWriter,
     /// Preload behind the memory of the tread, N.
     pub(super) remembered: LowPassState,
     /// Speed behind it.
@@ -113,10 +111,6 @@ pub struct LiftPoint {
     pub position: Millimetres,
     /// Gap with the nominal step height, mm: of a wheel as deep in the corner.
     pub gap: Millimetres,
-    /// How the wheel came here, and its distance to the face, mm.
-    pub history: History,
-    /// See `history`.
-    pub distance: Millimetres,
     /// Wheel speed as the tread remembers it, mm/s.
     pub speed: MillimetresPerSecond,
     /// Wheel speed in that tick, mm/s.

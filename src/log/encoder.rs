@@ -135,7 +135,6 @@ mod tests {
     use super::super::ledger::tests::crossing;
     use super::*;
     use crate::fault::Limit;
-    use crate::model::history::History;
     use crate::model::{Approach, Learned, LimitedBy, Outcome, Plan, PlanRequest, Review};
     use crate::supervise::Mode;
     use crate::tick::CrossingRecord;
@@ -265,9 +264,6 @@ mod tests {
         };
         let review = Review {
             direction: Direction::Retract,
-            history: History::steady(u16::MAX, most),
-            distance: most,
-            held: most,
             speed: most,
             preload: most,
             tan_arm: most,

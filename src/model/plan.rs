@@ -1,6 +1,5 @@
 //! Requests of the tick to the model task, and its answers.
 
-use super::history::History;
 use crate::fault::Limit;
 use crate::units::{Direction, Millimetres, MillimetresPerSecond, Newtons, Ratio, Seconds};
 
@@ -61,15 +60,9 @@ impl LimitedBy {
 pub struct Review {
     /// Direction of the crossing.
     pub direction: Direction,
-    /// How the wheel came to lift-off, and its distance to the face then, mm.
-    pub history: History,
-    /// See `history`.
-    pub distance: Millimetres,
-    /// Wheel speed then, mm/s.
-    pub held: MillimetresPerSecond,
-    /// Speed and preload at lift-off as the tread remembers them, mm/s and N.
+    /// Speed at lift-off, mm/s.
     pub speed: MillimetresPerSecond,
-    /// See `speed`.
+    /// Measured preload at lift-off, N.
     pub preload: Newtons,
     /// Tangent of the arm angle at lift-off.
     pub tan_arm: Ratio,

@@ -5,18 +5,16 @@
 mod approach;
 #[allow(clippy::float_arithmetic, reason = "SI to machine units, once at start")]
 mod build;
-mod review;
 
 pub use approach::KNOWN_SCALE;
 
 use super::dip::Dip;
 use super::guard::Guard;
-use super::plan::{Approach, Learned, LimitedBy, Plan, PlanRequest, Strategy};
+use super::plan::{Approach, Learned, LimitedBy, Outcome, Plan, PlanRequest, Review, Strategy};
 use super::reduced::{Point, ReducedModel, Scale};
 use super::timing::Timing;
-use super::tread::Tread;
 use crate::fault::Limit;
-use crate::numeric::{between, divide};
+use crate::numeric::{between, divide, sqrt};
 use crate::rig::MAX_STEPS;
 use crate::units::{
     Direction, Millimetres, MillimetresPerSecond, Newtons, Q16, Ratio, Seconds, q16,
@@ -84,7 +82,6 @@ pub struct Planner {
     model: ReducedModel,
     guard: Guard,
     timing: Timing,
-    tread: Tread,
     dip: Dip,
     strategy: Strategy,
     /// Tangent of the arm angle at each step.
@@ -132,7 +129,7 @@ impl Planner {
     pub fn plan(&self, request: &PlanRequest) -> Plan {
         let mut learned = request.learned;
         learned.scale = between(learned.scale, self.scale_range.0, self.scale_range.1);
-        let outcome = request.review.as_ref().map(|review| self.review(review, &learned));
+        let outcome = request.review.map(|review| self.review(&review, &learned));
         let mut learned = outcome.map_or(learned, |outcome| outcome.learned);
         if let Some(force) = request.slipped {
             let at = Point {
@@ -412,6 +409,65 @@ impl Planner {
         plan.brake_distance =
             self.timing.brake_distance(plan.cruise_speed, plan.approach.slowest_speed);
         plan.brake_time = self.timing.speed_change(plan.cruise_speed - plan.approach.slowest_speed);
+    }
+
+    /// Compares a crossing with the model, and learns from it.
+    ///
+    /// A scalar Kalman filter on the logarithm of the stiffness scale. What is known of the tread is
+    /// never surer than of one as known: each sleeve is another. A stiffness that contradicts
+    /// what is known makes that uncertain by as much: a stiffer one is taken at once, too
+    /// stiff a guess only costs time; a softer one with the next that agrees.
+    fn review(&self, review: &Review, known: &Learned) -> Outcome {
+        let at = Point {
+            direction: review.direction,
+            speed: review.speed,
+            scale: Scale::new(known.scale),
+            extra_load: known.extra_load,
+        };
+        let force = review.preload + self.thrust(known, review.tan_arm);
+        let crossing = self.model.crossing(&at, force);
+        let (friction, _) = self.friction_of(known);
+        let mut outcome = Outcome {
+            gap_predicted: crossing.gap,
+            slip_margin: friction - crossing.utilisation,
+            learned: *known,
+            bounded: false,
+            strange: false,
+            wide: review.seen > self.gap_ref(review.direction) * WIDE,
+        };
+        if !review.trusted {
+            return outcome;
+        }
+        let learned = &mut outcome.learned;
+        if !review.slipped {
+            learned.grips = learned.grips.max(crossing.utilisation);
+        }
+        let ratio = divide(self.model.observed_scale(&at, review.gap, force), known.scale);
+        outcome.strange = (ratio - Q16::ONE).abs() > STRANGE;
+        // The logarithm, by its first Pade approximant: at most 2 in magnitude.
+        let off = divide((ratio - Q16::ONE) + (ratio - Q16::ONE), ratio + Q16::ONE);
+        let measured = if known.unknown {
+            UNKNOWN_VARIANCE.max(self.measured_variance)
+        } else {
+            self.measured_variance
+        };
+        let mut variance = known.deviation * known.deviation;
+        let beyond = off * off - measured;
+        let surprising = off * off > (variance + measured) * SURPRISE;
+        if surprising && off > Q16::ZERO {
+            variance = beyond;
+        }
+        let gain = divide(variance, variance + measured);
+        variance = if surprising && off < Q16::ZERO { beyond } else { gain * measured };
+        learned.deviation = sqrt(variance).max(KNOWN_DEVIATION);
+        let half = off * gain.half();
+        let wanted = known.scale * divide(Q16::ONE + half, Q16::ONE - half);
+        learned.scale = between(wanted, self.scale_range.0, self.scale_range.1);
+        let missed = divide((review.gap - crossing.gap).abs(), review.gap.max(q16(100_000)));
+        let reserve = known.reserve.half() + missed * self.by_reserve;
+        learned.reserve = reserve.clamp(LEAST_RESERVE, MOST_RESERVE);
+        outcome.bounded = learned.scale != wanted;
+        outcome
     }
 
     /// Friction as far as known, and the part of it that may be used. What has gripped may be used

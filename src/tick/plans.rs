@@ -157,7 +157,6 @@ fn lead_time(open: &OpenCrossing, lifted_at: Tick) -> Seconds {
 mod tests {
     use super::super::tests::{sensed, within};
     use super::*;
-    use crate::model::history::History;
     use crate::model::{Learned, Planner, Review};
     use crate::rig::Rig;
     use crate::supervise::Leg;
@@ -229,9 +228,6 @@ mod tests {
         let planner = Planner::try_build(&Rig::prototype()).expect("sound");
         let review = Review {
             direction: Direction::Deploy,
-            history: History::steady(25, q16(52_000_000)),
-            distance: q16(12_000_000),
-            held: q16(8_000_000),
             speed: q16(8_000_000),
             preload: q16(45_000_000),
             tan_arm: Q16::ONE,

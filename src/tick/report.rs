@@ -33,9 +33,6 @@ impl Controller {
             state.planning.closed = Some(open);
             state.planning.review = open.lift.map(|point| Review {
                 direction: open.direction,
-                history: point.history,
-                distance: point.distance,
-                held: point.held,
                 speed: point.speed,
                 preload: point.remembered,
                 tan_arm: point.tan_arm,

@@ -6,7 +6,6 @@
 
 use super::parity;
 use hil_sim::session::Echo;
-use interstage::model::history::History;
 use interstage::model::reduced::{Point, ReducedModel, Scale};
 use interstage::model::{Learned, Plan, PlanRequest, Planner, Review};
 use interstage::rig::Rig;
@@ -236,9 +235,6 @@ fn asked(planner: &Planner, model: &ReducedModel) -> Option<String> {
                 let _ = model.observed_scale(&point, a, b);
                 let review = Review {
                     direction,
-                    history: History::steady(1, a),
-                    distance: b,
-                    held: speed,
                     speed,
                     preload: a,
                     tan_arm: b,

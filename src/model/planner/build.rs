@@ -7,7 +7,6 @@ use crate::model::guard::Guard;
 use crate::model::plan::Strategy;
 use crate::model::reduced::{ReducedModel, Scale};
 use crate::model::timing::Timing;
-use crate::model::tread::Tread;
 use crate::numeric::checked;
 use crate::rig::{MAX_STEPS, Rig, RigError};
 use crate::units::{Direction, Millimetres, Ratio};
@@ -63,7 +62,6 @@ impl Planner {
             model,
             guard: Guard::try_build(rig)?,
             timing: Timing::try_build(rig)?,
-            tread: Tread::try_build(rig)?,
             dip: Dip::try_build(rig)?,
             strategy,
             tangents,
@@ -118,7 +116,6 @@ fn felt_at(rig: &Rig) -> Result<[Millimetres; 2], RigError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::history::History;
     use crate::model::plan::{Learned, PlanRequest, Review, Strategy};
     use crate::units::Q16;
     use proptest::prelude::*;
@@ -201,9 +198,6 @@ mod tests {
             let q = Q16::from_num::<f64>;
             let review = Review {
                 direction: Direction::Deploy,
-                history: History::steady((200.0 / speed.max(0.01)) as u16, q(preload + 7.0)),
-                distance: q(12.0),
-                held: q(speed),
                 speed: q(speed),
                 preload: q(preload),
                 tan_arm: q(1.0),

@@ -1,10 +1,6 @@
 //! Plans and reviews on the preset rigs.
 
 use super::*;
-use crate::model::history::History;
-use crate::model::plan::{Outcome, Review};
-use crate::model::rollout::{Run, roll};
-use crate::model::tread::{Axial, TreadState};
 use crate::rig::Rig;
 use crate::units::q16;
 
@@ -14,9 +10,6 @@ fn reviewed_after(wider: f64, trusted: bool, known: &Learned) -> Outcome {
     let planner = Planner::try_build(&Rig::prototype()).expect("a sound rig");
     let mut review = Review {
         direction: Direction::Deploy,
-        history: History::steady(25, q16(54_000_000)),
-        distance: q16(12_100_000),
-        held: q16(8_000_000),
         speed: q16(8_000_000),
         preload: q16(47_000_000),
         tan_arm: q16(1_000_000),
@@ -25,19 +18,10 @@ fn reviewed_after(wider: f64, trusted: bool, known: &Learned) -> Outcome {
         trusted: false,
         slipped: false,
     };
-    review.gap = planned_gap(&planner, known) + Millimetres::from_num(wider);
+    let predicted = planner.review(&review, known).gap_predicted;
+    review.gap = predicted + Millimetres::from_num(wider);
     review.trusted = trusted;
     planner.review(&review, known)
-}
-
-/// Gap of that crossing by the model that plans.
-fn planned_gap(planner: &Planner, known: &Learned) -> Millimetres {
-    let at = Point {
-        scale: Scale::new(known.scale),
-        ..Point::nominal(Direction::Deploy, q16(8_000_000))
-    };
-    let force = q16(47_000_000) + planner.thrust(known, q16(1_000_000));
-    planner.model.crossing(&at, force).gap
 }
 
 /// The same of a tread as known.
@@ -50,47 +34,8 @@ fn observed(wider: f64) -> f64 {
     let planner = Planner::try_build(&Rig::prototype()).expect("a sound rig");
     let at = Point::nominal(Direction::Deploy, q16(8_000_000));
     let force = q16(47_000_000) + planner.thrust(&Learned::default(), q16(1_000_000));
-    let gap = planned_gap(&planner, &Learned::default()) + Millimetres::from_num(wider);
+    let gap = planner.model.crossing(&at, force).gap + Millimetres::from_num(wider);
     planner.model.observed_scale(&at, gap, force).to_num()
-}
-
-#[test]
-fn the_predicted_gap_is_that_of_the_tread_rolled_as_it_was_measured() {
-    let planner = Planner::try_build(&Rig::prototype()).expect("a sound rig");
-    let tread = crate::model::tread::Tread::try_build(&Rig::prototype()).expect("a sound rig");
-    let mut state = TreadState::default();
-    for (direction, ticks, distance) in
-        [(Direction::Deploy, 25, 12_100_000), (Direction::Retract, 10, 10_800_000)]
-    {
-        let pressed = q16(54_000_000);
-        let (from, until) = match direction {
-            Direction::Deploy => (-q16(35_000_000), Q16::ZERO),
-            Direction::Retract => (q16(20_000_000), -q16(14_000_000)),
-        };
-        let axial = Axial::Driven(planner.load);
-        let run = Run { direction, axial, scale: Q16::ONE, level: false, from, until };
-        let speed = divide(tread.stride(), crate::units::ticks_to_seconds(ticks));
-        let rolled = roll(&tread, &mut state, &run, |_| (speed, pressed)).lift;
-        let review = Review {
-            direction,
-            history: History::steady(ticks as u16, pressed),
-            distance: q16(distance),
-            held: speed,
-            speed,
-            preload: pressed,
-            tan_arm: Q16::ONE,
-            gap: Q16::ONE,
-            seen: Q16::ONE,
-            trusted: false,
-            slipped: false,
-        };
-        let got = planner.review(&review, &Learned::default());
-        // The strides end elsewhere: half a per cent of the gap.
-        let off = (got.gap_predicted - rolled.gap).abs();
-        assert!(off < q16(13_000) && rolled.is_found(), "{off} of {}", rolled.gap);
-        let margin = planner.friction - rolled.utilisation;
-        assert!((got.slip_margin - margin).abs() < q16(10_000), "{direction:?}");
-    }
 }
 
 #[test]
@@ -120,10 +65,9 @@ fn two_gaps_that_agree_override_what_was_known_of_the_stiffness() {
     // first gap is taken by half only.
     for (known, softer) in [(2.0, 0.0), (1.0, -0.17)] {
         let known = Learned { scale: Ratio::from_num(known), ..Learned::default() };
-        let planner = Planner::try_build(&Rig::prototype()).expect("a sound rig");
-        let gap = planned_gap(&planner, &Learned::default()) + Millimetres::from_num(softer);
+        let gap = reviewed(softer, true).gap_predicted + Millimetres::from_num(softer);
         let again = |known: &Learned| {
-            let wider = gap - planned_gap(&planner, known);
+            let wider = gap - reviewed_after(0.0, true, known).gap_predicted;
             reviewed_after(wider.to_num(), true, known).learned
         };
         let first = again(&known);
