@@ -55,10 +55,11 @@ pub fn roll(
     mut course: impl FnMut(Millimetres) -> (MillimetresPerSecond, Newtons),
 ) -> Rolled {
     let forward = run.direction == Direction::Deploy;
+    let (mut speed, pressed) = course(run.from);
     let mut drive = Drive {
         direction: run.direction,
         axial: run.axial,
-        pressed: course(run.from).1,
+        pressed,
         duration: Q16::ZERO,
         scale: run.scale,
         level: run.level,
@@ -67,12 +68,14 @@ pub fn roll(
     let mut rolled = Rolled::default();
     let mut last: Option<Contact> = None;
     let mut position = run.from;
+    let ahead = if forward { tread.stride() } else { -tread.stride() };
     // The wheel needs a stride to each stride of travel, and on the edge up to twice that.
     let most = between(divide((run.until - run.from).abs(), tread.stride()).floor(), 0, 2000);
     for stride in 0..2 * most {
-        let (speed, pressed) = course(position);
-        drive.pressed = pressed;
-        drive.duration = divide(tread.stride(), speed.max(LEAST_SPEED));
+        let before = speed;
+        (speed, drive.pressed) = course(position + ahead);
+        // Exact where the acceleration is constant.
+        drive.duration = divide(tread.stride(), (before.half() + speed.half()).max(LEAST_SPEED));
         let contact = tread.advance(state, &drive);
         position = contact.position;
         rolled.visits += contact.visits;

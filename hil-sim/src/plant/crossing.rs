@@ -1,4 +1,4 @@
-//! One isolated crossing at constant speed and preload.
+//! One isolated crossing, at constant speed and preload or over a course of both.
 
 use super::balance::{Axial, Balance, BalanceError};
 use super::ring::{Contact, Motion, Ring, RingParameters};
@@ -45,25 +45,46 @@ pub struct CrossingResult {
     pub lift_area_mm2: f64,
 }
 
-/// Rolls the wheel over one step and measures.
+/// Rolls the wheel over one step at constant speed and preload, and measures.
 ///
 /// # Errors
 /// [`BalanceError`] if no height of the centre balances the preload.
 pub fn cross(case: &CrossingCase) -> Result<CrossingResult, BalanceError> {
+    cross_course(case, |_| (case.speed_mm_s.abs(), case.preload_n))
+}
+
+/// Where a crossing that begins at this speed starts and ends, mm from the face: far enough from
+/// the corner to forget how the wheel was put down, and past it until the patch has left the edge.
+#[must_use]
+pub fn span_mm(case: &CrossingCase, speed_mm_s: f64) -> (f64, f64) {
+    let radius = case.ring.radius_mm;
+    let below = radius - case.step_height_mm;
+    let run = (radius * radius - below * below).sqrt();
+    let settle = (8.0 * case.ring.tau_s * speed_mm_s).min(2.0 * radius) + 0.5 * radius;
+    if case.speed_mm_s > 0.0 {
+        (-run - settle, 0.6 * radius)
+    } else {
+        (settle, -run - 0.6 * radius)
+    }
+}
+
+/// The same where `course` gives speed, mm/s, not negative, and preload, N, at a position of the
+/// axle, mm from the face. Of the case only the speed's sign counts.
+///
+/// # Errors
+/// [`BalanceError`] if no height of the centre balances the preload.
+pub fn cross_course(
+    case: &CrossingCase,
+    course: impl Fn(f64) -> (f64, f64),
+) -> Result<CrossingResult, BalanceError> {
     let radius = case.ring.radius_mm;
     let forward = case.speed_mm_s > 0.0;
     let wall = Wall::new(vec![Step { position_mm: 0.0, height_mm: case.step_height_mm }]);
     let mut ring = Ring::new(case.ring);
-    let balance =
-        Balance { preload_n: case.preload_n, spring_n_per_mm: 0.0, arm_n: 0.0, axial: case.axial };
-    // Far enough before the corner to forget how the wheel was put down, and past
-    // it until the patch has left the edge.
     let below = radius - case.step_height_mm;
     let run = (radius * radius - below * below).sqrt();
-    let settle = (8.0 * case.ring.tau_s * case.speed_mm_s.abs()).min(2.0 * radius) + 0.5 * radius;
-    let (start, end) =
-        if forward { (-run - settle, 0.6 * radius) } else { (settle, -run - 0.6 * radius) };
-    let dt = case.stride_mm / case.speed_mm_s.abs();
+    let far = if forward { f64::NEG_INFINITY } else { f64::INFINITY };
+    let (start, end) = span_mm(case, course(far).0);
     let steps = ((end - start).abs() / case.stride_mm).ceil() as usize;
     let dx = case.stride_mm.copysign(case.speed_mm_s);
 
@@ -74,7 +95,12 @@ pub fn cross(case: &CrossingCase) -> Result<CrossingResult, BalanceError> {
     let mut last: Option<(f64, f64, Contact, f64)> = None;
     let mut previous_axial = 0.0;
     for index in 0..steps {
+        // Timed by its middle, pressed as at its end.
+        let dt = case.stride_mm / course(x + 0.5 * dx).0;
         x = start + dx * (index + 1) as f64;
+        let (_, preload_n) = course(x);
+        let balance =
+            Balance { preload_n, spring_n_per_mm: 0.0, arm_n: 0.0, axial: case.axial };
         let local = wall.local(x);
         height += base - local.base_mm;
         base = local.base_mm;
