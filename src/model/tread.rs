@@ -1,43 +1,58 @@
 //! The tread, rolled out: a viscoelastic ring over a step, in fixed point. The one place in the
 //! controller that knows rubber.
 //!
-//! Elements lie along rays from the wheel's centre, [`rays::PITCH`] apart. A stride rolls the
-//! tread on by one of them. An element at depth d carries the pressure of the three-parameter
-//! solid ([`relaxation`]), never a tension; the centre is where the contact carries what presses
-//! the wheel. Only elements in contact are visited; those that leave it are fresh when they
-//! return.
+//! Elements lie along rays from the wheel's centre. A stride rolls the tread on by one of them. An
+//! element at depth d carries the pressure of the three-parameter solid ([`relaxation`]), never a
+//! tension; the centre is where the contact carries what presses the wheel. Only elements in
+//! contact are visited; those that leave it are fresh when they return.
 //!
-//! Equations, with c and s the sums of `p cos` and `p sin` over the contact: pushed `c = N`; driven
-//! by torque against an axial load G `c + u s = N` with the utilisation `u = (G + s) / c`. One
-//! step of Newton's method a stride, whose remainder the next stride makes good. The axle moves
-//! `sqrt(ds^2 - dy^2)` while the tread rolls ds (FACTS: rolling over an edge), or as far as the
-//! tread where that is asked for.
+//! Equations, with c and s the sums of `p cos` and `p sin` over the contact ([`sums`]): pushed
+//! `c = N`; driven by torque against an axial load G `c + u s = N` with the utilisation
+//! `u = (G + s) / c`. One step of Newton's method a stride, whose remainder the next stride makes
+//! good; another where the first moved far. The axle moves `sqrt(ds^2 - dy^2)` while the tread
+//! rolls ds (a wheel that pivots about an edge runs farther than its axle), or as far as the tread
+//! where that is asked for.
 //!
 //! Source: Lee and Radok 1960 for the solid; the rolling scheme is this project's own.
 
 #![deny(clippy::float_arithmetic)]
 
+mod balance;
 #[allow(clippy::float_arithmetic, reason = "SI to machine units, once at start")]
 mod build;
+mod memory;
 mod rays;
+mod reach;
 mod relaxation;
 mod state;
+mod sums;
 
 use crate::numeric::{divide, high, sqrt};
 use crate::units::{Direction, Millimetres, Newtons, Q16, Ratio, Seconds, q16};
-use rays::{AHEAD, BEHIND, ray};
 use relaxation::Stride;
+use sums::Sums;
 
-pub use state::TreadState;
-use state::{Element, Frame, Patch};
+pub use state::PitchedState;
+
+/// The tread as shipped: on the published wheel an element is 0.2 mm of it.
+pub type Tread = PitchedTread<8000, 256>;
+/// Its state.
+pub type TreadState = PitchedState<256>;
 
 /// Largest change of the centre's height in a stride over the stride: steeper than any step that
 /// a wheel can climb.
 const STEEPEST: Ratio = q16(950_000);
 
-/// Wheel, rubber and step in machine units. The default is a place to read one into.
+/// A correction of less than the steepest one over two to this is the last.
+const NEAR: u32 = 4;
+
+/// Most steps of Newton's method in a stride.
+const PASSES: u32 = 4;
+
+/// Wheel, rubber and step in machine units, with elements `PITCH` microradians apart. The default
+/// is a place to read one into.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-pub struct Tread {
+pub struct PitchedTread<const PITCH: u32, const ELEMENTS: usize> {
     /// Wheel radius and step height, mm, Q22.
     radius: i32,
     height: i32,
@@ -99,29 +114,7 @@ pub struct Contact {
     pub visits: u32,
 }
 
-/// What the rays meet from where the wheel is, places of the first ray on the face and of the first
-/// on the upper wall; below them is the lower wall.
-#[derive(Clone, Copy, Debug)]
-struct Facets {
-    face: i32,
-    top: i32,
-}
-
-/// Sums over the elements in contact.
-#[derive(Clone, Copy, Debug, Default)]
-struct Sums {
-    /// Pressure, mm, by cosine and sine, Q46.
-    cos: i64,
-    sin: i64,
-    /// Elements whose depth changes with the height, and their tangents, Q29.
-    moves: i32,
-    tan: i64,
-    /// Largest pressure on the lower wall, mm, Q16.
-    floor: i32,
-    visits: u32,
-}
-
-impl Tread {
+impl<const PITCH: u32, const ELEMENTS: usize> PitchedTread<PITCH, ELEMENTS> {
     /// Tread between two elements, mm.
     pub const fn stride(&self) -> Millimetres {
         self.stride
@@ -133,64 +126,74 @@ impl Tread {
     }
 
     /// A wheel put down at this position from the face, relaxed, under this force, N.
-    pub fn put_down(&self, state: &mut TreadState, position: Millimetres, drive: &Drive) {
-        state.clear();
+    pub fn put_down(
+        &self,
+        state: &mut PitchedState<ELEMENTS>,
+        position: Millimetres,
+        drive: &Drive,
+    ) {
+        *state = PitchedState::default();
         let on_top = position >= Q16::ZERO;
         state.frame.position = position.to_bits().saturating_mul(64);
         let wall = if on_top { self.height } else { 0 };
         state.frame.centre = self.radius + wall;
-        // No time, all time: the height of the relaxed tread, from outside.
-        let still = Stride::new(i32::MAX, self.excess);
+        let still = Stride::RELAXED;
         for _ in 0..12 {
-            let facets = self.facets(&state.frame);
-            let sums = self.sums(state, &still, facets);
+            state.reach = self.reach(&state.frame, &state.reach);
+            let sums = self.sums(state, &still, &state.reach);
             let change = self.correction(&sums, &still, drive).1;
             let change = if sums.visits == 0 { q16(-100_000) } else { change };
             state.frame.centre += change.to_bits().clamp(-10_000, 10_000) << 6;
         }
-        let facets = self.facets(&state.frame);
-        self.commit(state, &still, facets);
-        state.frame.climb = 0;
+        let reach = self.reach(&state.frame, &state.reach);
+        self.commit(state, &still, reach, true);
     }
 
     /// Rolls on by one element.
-    pub fn advance(&self, state: &mut TreadState, drive: &Drive) -> Contact {
+    pub fn advance(&self, state: &mut PitchedState<ELEMENTS>, drive: &Drive) -> Contact {
         let forward = drive.direction == Direction::Deploy;
         state.frame.turn(forward);
-        for patch in &mut state.patches {
-            patch.turn(forward);
-        }
         let travel = self.travel(state, drive);
         state.frame.position += if forward { travel } else { -travel };
+        let before = state.frame.centre;
         state.frame.centre += state.frame.climb;
         let stride = Stride::new(Stride::ratio(drive.duration, self.per_tau), self.excess);
-        let facets = self.facets(&state.frame);
-        let sums = self.sums(state, &stride, facets);
-        let (contact, change) = self.correction(&sums, &stride, drive);
         let steepest = (self.stride * STEEPEST).to_bits() << 6;
-        let change = if sums.visits == 0 { -steepest / 4 } else { change.to_bits() << 6 };
-        let change = change.clamp(-steepest, steepest);
-        state.frame.climb = (state.frame.climb + change).clamp(-steepest, steepest);
-        state.frame.centre += change;
-        let facets = self.facets(&state.frame);
-        self.commit(state, &stride, facets);
-        let floor = if sums.floor > i32::MIN {
-            Q16::from_bits(sums.floor) - Q16::from_bits(high(change, stride.loads))
-        } else {
-            // What a fresh element as deep in the wall as it is away would carry.
-            -Q16::from_bits(high((state.frame.centre - self.radius).abs(), stride.loads))
-        };
+        let mut reach = self.reach(&state.frame, &state.reach);
+        let (mut contact, mut floor, mut visits) = (Contact::default(), None, 0);
+        for _ in 0..PASSES {
+            let sums = self.sums(state, &stride, &reach);
+            visits += sums.visits;
+            let (at, change) = self.correction(&sums, &stride, drive);
+            let change = if sums.visits == 0 { -steepest / 4 } else { change.to_bits() << 6 };
+            let change = change.clamp(-steepest, steepest);
+            state.frame.centre += change;
+            reach = self.reach(&state.frame, &reach);
+            // An element that the correction lifts off is followed.
+            let carried = if sums.floor > i32::MIN { Some(sums.floor) } else { floor };
+            floor = carried.map(|pressure| pressure - high(change, stride.loads));
+            contact = at;
+            // Where the lower wall is left, what was linear is not.
+            let leaves = floor.is_some_and(|now| now < sums.floor / 2) && sums.floor > 0;
+            if !leaves && change.abs() < steepest >> NEAR {
+                break;
+            }
+        }
+        state.frame.climb = state.frame.centre - before;
+        self.commit(state, &stride, reach, forward);
+        // A fresh element above the lower wall would carry as much as one as deep in it.
+        let above = || -high((state.frame.centre - self.radius).abs(), stride.loads);
         Contact {
             position: Q16::from_bits(state.frame.position >> 6),
             centre: Q16::from_bits(state.frame.centre >> 6),
-            floor,
-            visits: sums.visits,
+            floor: Q16::from_bits(floor.unwrap_or_else(above)),
+            visits,
             ..contact
         }
     }
 
     /// Travel of the axle in a stride, mm, Q22.
-    fn travel(&self, state: &TreadState, drive: &Drive) -> i32 {
+    fn travel(&self, state: &PitchedState<ELEMENTS>, drive: &Drive) -> i32 {
         if drive.level {
             return self.stride.to_bits() << 6;
         }
@@ -203,158 +206,6 @@ impl Tread {
         // Q16 x Q16 to Q22, kept to the last bit.
         let part = level * rolls;
         ((i64::from(part.to_bits()) * i64::from(self.stride.to_bits())) >> 10) as i32
-    }
-
-    /// What the rays meet. A ray at the angle a meets the lower wall before the face for
-    /// `y tan a < -x`, and the upper wall behind the corner for `(y - h) tan a > -x`.
-    fn facets(&self, state: &Frame) -> Facets {
-        let to_face = -state.position;
-        let above = (state.centre - self.height).max(1);
-        let first = |height: i32, from: i32| {
-            let beyond = |place: &i32| {
-                // Q22 x Q29 to Q19.
-                ray(*place).is_none_or(|ray| high(height, ray.tan) >= to_face >> 3)
-            };
-            let (mut low, mut high) = (from, AHEAD);
-            while low < high {
-                let middle = (low + high).div_euclid(2);
-                if beyond(&middle) { high = middle } else { low = middle + 1 }
-            }
-            low
-        };
-        let top = first(above, -BEHIND);
-        let face = if to_face > 0 { first(state.centre, 0).min(top) } else { top };
-        Facets { face, top }
-    }
-
-    /// Depth along this ray, mm, Q22.
-    fn depth(&self, state: &Frame, place: i32, facets: Facets) -> i32 {
-        let Some(ray) = ray(place) else { return i32::MIN };
-        if place < facets.face {
-            self.radius - (high(state.centre, ray.sec) << 3)
-        } else if place >= facets.top {
-            self.radius - (high(state.centre - self.height, ray.sec) << 3)
-        } else {
-            // x / sin a = x / (cos a tan a): by division, the face has few rays.
-            let to_face = Q16::from_bits(-state.position >> 6);
-            let distance = divide(to_face, Q16::from_bits(ray.sin >> 14));
-            self.radius - (distance.to_bits() << 6)
-        }
-    }
-}
-
-impl Tread {
-    /// Calls for each element that touches the wall: its place and depth, and whether it is on the
-    /// lower wall and whether on the face. Gives the places visited there and on the step.
-    #[inline(always)]
-    fn touching(
-        &self,
-        state: &Frame,
-        facets: Facets,
-        mut visit: impl FnMut(i32, i32, bool, bool),
-    ) -> [Patch; 2] {
-        let mut run = |from: i32, ahead: bool, until: i32, floor: bool, face: bool| {
-            let mut place = from;
-            while place != until {
-                let depth = self.depth(state, place, facets);
-                if depth <= 0 {
-                    break;
-                }
-                visit(place, depth, floor, face);
-                place += if ahead { 1 } else { -1 };
-            }
-            place
-        };
-        let bottom = 0.min(facets.face - 1);
-        let low = run(bottom, false, -BEHIND - 1, true, false) + 1;
-        let high = run(bottom + 1, true, facets.face.min(AHEAD).max(bottom + 1), true, false);
-        let floor = Patch { low, high };
-        let corner = facets.top.max(0);
-        let high = run(corner, true, AHEAD.max(corner), false, false);
-        let end = run(corner - 1, false, facets.top - 1, false, false);
-        let low = if end < facets.top {
-            run(facets.top - 1, false, facets.face - 1, false, true)
-        } else {
-            end
-        };
-        [floor, Patch { low: low + 1, high }]
-    }
-
-    /// Sums over the contact at the present height.
-    fn sums(&self, state: &TreadState, stride: &Stride, facets: Facets) -> Sums {
-        let mut sums = Sums { floor: i32::MIN, ..Sums::default() };
-        self.touching(&state.frame, facets, |place, depth, floor, face| {
-            sums.visits += 1;
-            let Element { memory, depth: before } = state.element(place);
-            let relief = high(memory, stride.relieves) + high(before, stride.relieved);
-            let pressure = high(depth, stride.loads) - relief;
-            if floor {
-                sums.floor = sums.floor.max(pressure);
-            }
-            if pressure > 0
-                && let Some(ray) = ray(place)
-            {
-                sums.cos += i64::from(pressure) * i64::from(ray.cos);
-                sums.sin += i64::from(pressure) * i64::from(ray.sin);
-                if !face {
-                    sums.moves += 1;
-                    sums.tan += i64::from(ray.tan);
-                }
-            }
-        });
-        sums
-    }
-
-    /// Moves the elements' memory to the stride's end; what has left the wall is fresh.
-    fn commit(&self, state: &mut TreadState, stride: &Stride, facets: Facets) {
-        let TreadState { frame, elements, patches } = state;
-        let touched = self.touching(frame, facets, |place, depth, _, _| {
-            let Some(element) = elements.get_mut(frame.index(place)) else { return };
-            let memory = high(element.memory, stride.keeps)
-                + high(depth, stride.takes)
-                + high(element.depth, stride.took);
-            *element = Element { memory: memory << 1, depth };
-        });
-        for patch in &*patches {
-            for place in patch.low..patch.high {
-                if !touched.iter().any(|now| now.has(place))
-                    && let Some(element) = elements.get_mut(frame.index(place))
-                {
-                    *element = Element::default();
-                }
-            }
-        }
-        *patches = touched;
-    }
-
-    /// Contact with the height corrected, and the correction, mm: one step of Newton's method.
-    fn correction(&self, sums: &Sums, stride: &Stride, drive: &Drive) -> (Contact, Millimetres) {
-        // In millimetres of relaxed depth, which keep their bits whatever the rubber's stiffness.
-        let rate = self.rate * drive.scale;
-        let pressed = divide(drive.pressed, rate);
-        let depth = |sum: i64| Q16::saturating_from_bits(sum >> 30);
-        let (c, s) = (depth(sums.cos), depth(sums.sin));
-        let loads = Q16::from_bits(stride.loads >> 10);
-        let dc = -(loads * Q16::from_num(sums.moves));
-        let ds = -(loads * Q16::saturating_from_bits(sums.tan >> 13));
-        let used = |c: Q16, s: Q16| match drive.axial {
-            Axial::Pushed => Q16::ZERO,
-            Axial::Driven(_) if c <= Q16::ZERO => Q16::ZERO,
-            Axial::Driven(load) => divide(divide(load, rate) + s, c),
-        };
-        let u = used(c, s);
-        let du = if u == Q16::ZERO { u } else { divide(ds - u * dc, c) };
-        let slope = dc + u * ds + du * s;
-        let missing = pressed - c - u * s;
-        let change = if slope < Q16::ZERO { divide(missing, slope) } else { -missing };
-        let (c, s) = (c + dc * change, s + ds * change);
-        let contact = Contact {
-            radial: c * rate,
-            axial: s * rate,
-            utilisation: used(c, s),
-            ..Contact::default()
-        };
-        (contact, change)
     }
 }
 

@@ -1,46 +1,55 @@
 //! Directions from the wheel's centre along which the tread's elements lie.
 
-/// Rays behind and ahead of the one straight down: to 0.5 and 1.0 rad.
-pub(super) const BEHIND: i32 = 64;
-/// See [`BEHIND`].
-pub(super) const AHEAD: i32 = 128;
-
-/// Angle between two rays, rad: on the published wheel an element is 0.2 mm of tread.
-pub(super) const PITCH: f64 = 0.008;
-
-/// Sine and cosine, Q30, and secant and tangent, Q29, of a ray's angle from straight down, ahead
-/// positive.
+/// Sine and cosine, Q30, secant and tangent, Q29, and cosecant, Q24, of a ray's angle from straight
+/// down, ahead positive.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ray {
     pub(super) sin: i32,
     pub(super) cos: i32,
     pub(super) sec: i32,
     pub(super) tan: i32,
+    pub(super) csc: i32,
 }
 
-/// All rays, the hindmost first.
-pub(super) static RAYS: [Ray; (BEHIND + AHEAD) as usize] = table();
+/// Rays this many microradians apart, one for each element of the state.
+pub(super) struct Rays<const PITCH: u32, const ELEMENTS: usize>;
 
-/// The ray that many places ahead of straight down, none beyond the ends.
-pub(super) fn ray(place: i32) -> Option<&'static Ray> {
-    RAYS.get(usize::try_from(place + BEHIND).ok()?)
-}
+impl<const PITCH: u32, const ELEMENTS: usize> Rays<PITCH, ELEMENTS> {
+    /// Rays behind the one straight down, and from it on ahead: to 0.77 and 1.27 rad as shipped.
+    pub(super) const BEHIND: i32 = (ELEMENTS as i32) * 3 / 8;
+    /// See [`Self::BEHIND`].
+    pub(super) const AHEAD: i32 = ELEMENTS as i32 - Self::BEHIND;
+    /// All rays, the hindmost first.
+    const ALL: &[Ray; ELEMENTS] = &Self::table();
 
-const fn table() -> [Ray; (BEHIND + AHEAD) as usize] {
-    let mut rays = [Ray { sin: 0, cos: 0, sec: 0, tan: 0 }; (BEHIND + AHEAD) as usize];
-    let mut index = 0;
-    while index < rays.len() {
-        rays[index] = at(index as i64 - BEHIND as i64);
-        index += 1;
+    /// The ray that many places ahead of straight down, none beyond the ends.
+    #[inline(always)]
+    pub(super) fn at(place: i32) -> Option<&'static Ray> {
+        Self::ALL.get(place.wrapping_add(Self::BEHIND) as usize)
     }
-    rays
+
+    /// The rays from one place to before another, none if there is one beyond the ends.
+    #[inline(always)]
+    pub(super) fn between(low: i32, high: i32) -> &'static [Ray] {
+        let at = |place: i32| place.wrapping_add(Self::BEHIND) as usize;
+        Self::ALL.get(at(low)..at(high)).unwrap_or_default()
+    }
+
+    const fn table() -> [Ray; ELEMENTS] {
+        let mut rays = [Ray { sin: 0, cos: 0, sec: 0, tan: 0, csc: 0 }; ELEMENTS];
+        let mut index = 0;
+        while index < ELEMENTS {
+            rays[index] = ray((index as i64 - Self::BEHIND as i64) * PITCH as i64);
+            index += 1;
+        }
+        rays
+    }
 }
 
-/// By the series of sine and cosine in Q60, whose terms shrink by half and more.
-const fn at(place: i64) -> Ray {
+/// The ray at this angle, microradians, by the series of sine and cosine in Q60.
+const fn ray(microradians: i64) -> Ray {
     const ONE: i128 = 1 << 60;
-    // 0.008 in Q60.
-    let angle = place as i128 * (ONE / 125);
+    let angle = microradians as i128 * ONE / 1_000_000;
     let (mut term, mut sums, mut n) = (ONE, [0_i128; 2], 0);
     while n < 30 {
         sums[n % 2] += if n % 4 < 2 { term } else { -term };
@@ -53,6 +62,8 @@ const fn at(place: i64) -> Ray {
         cos: (cos >> 30) as i32,
         sec: ((ONE << 29) / cos) as i32,
         tan: ((sin << 29) / cos) as i32,
+        // Saturated straight down, where no ray meets the face.
+        csc: if sin > ONE >> 7 { ((ONE << 24) / sin) as i32 } else { i32::MAX },
     }
 }
 
@@ -61,21 +72,28 @@ const fn at(place: i64) -> Ray {
 mod tests {
     use super::*;
 
+    type Shipped = Rays<8000, 256>;
+
     #[test]
     fn every_ray_is_at_its_angle() {
-        for place in -BEHIND..AHEAD {
-            let (sin, cos) = (f64::from(place) * PITCH).sin_cos();
-            let got = ray(place).expect("within");
+        for place in -Shipped::BEHIND..Shipped::AHEAD {
+            let (sin, cos) = (f64::from(place) * 0.008).sin_cos();
+            let got = Shipped::at(place).expect("within");
             for (bits, exact, one) in [
                 (got.sin, sin, 30),
                 (got.cos, cos, 30),
                 (got.sec, 1.0 / cos, 29),
                 (got.tan, sin / cos, 29),
+                (got.csc, if place > 0 { 1.0 / sin } else { 128.0 }, 24),
             ] {
                 let error = f64::from(bits) - exact * f64::from(1 << one);
                 assert!(error.abs() <= 1.0, "{place}: {error} LSB");
             }
         }
-        assert!(ray(-BEHIND - 1).is_none() && ray(AHEAD).is_none());
+        assert!(Shipped::at(-Shipped::BEHIND - 1).is_none());
+        assert!(Shipped::at(Shipped::AHEAD).is_none());
+        assert_eq!(Shipped::between(-Shipped::BEHIND, Shipped::AHEAD).len(), 256);
+        assert_eq!(Shipped::between(-2, 3).len(), 5);
+        assert!(Shipped::between(3, -2).is_empty());
     }
 }

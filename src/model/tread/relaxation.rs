@@ -34,6 +34,10 @@ pub(super) struct Stride {
 }
 
 impl Stride {
+    /// So long that the tread has relaxed.
+    pub(super) const RELAXED: Self =
+        Self { keeps: 0, takes: i32::MAX, took: 0, loads: 1 << 26, relieves: 0, relieved: 0 };
+
     /// A stride of this duration over the relaxation time, Q23, of a tread with this excess
     /// `s - 1`, Q26.
     pub(super) fn new(ratio: i32, excess: i32) -> Self {
@@ -126,5 +130,7 @@ mod tests {
         let [now, ever] = [0, i32::MAX].map(|ratio| Stride::new(ratio, 3 << 26));
         assert!(now.keeps == i32::MAX && now.takes < 4 && now.took < 4, "{now:?}");
         assert!(ever.keeps == 0 && ever.takes > i32::MAX - (1 << 24), "{ever:?}");
+        let relaxed = Stride::RELAXED;
+        assert!(relaxed.takes - ever.takes < 1 << 24 && ever.loads - relaxed.loads < 1 << 20);
     }
 }
