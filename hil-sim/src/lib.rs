@@ -4,6 +4,7 @@
 pub mod bringup;
 pub mod cli;
 pub mod compare;
+pub mod course;
 pub mod envelope;
 pub mod faults;
 pub mod files;

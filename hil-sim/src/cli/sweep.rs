@@ -6,7 +6,7 @@ use interstage::units;
 use rayon::prelude::*;
 use serde_json::{Map, Value, json};
 
-use super::crossing::{CrossingSetup, Method};
+use super::crossing::{CrossingSetup, Method, constant};
 use super::failure::{Failure, Outcome};
 use super::output;
 use super::scenario::RunArgs;
@@ -148,15 +148,17 @@ impl Point {
         };
         let loads = &scenario.rig.plant;
         let setup = CrossingSetup {
-            speed_mm_s: given(SPEED, scenario.rig.control.safe_speed_mm_s)?,
-            preload_n: given(PRELOAD, scenario.rig.preload.cruise_n)?,
+            course: constant(
+                ["--key speed_mm_s", "--key preload_n"],
+                given(SPEED, scenario.rig.control.safe_speed_mm_s)?,
+                given(PRELOAD, scenario.rig.preload.cruise_n)?,
+            )?,
             direction: match scenario.run.direction {
                 Direction::Deploy => units::Direction::Deploy,
                 Direction::Retract => units::Direction::Retract,
             },
             load_n: args.driven.then_some(loads.top_load_n * loads.top_load_share),
         };
-        setup.check(["--key speed_mm_s", "--key preload_n"])?;
         Ok(Self { scenario, crossing: Some(setup) })
     }
 

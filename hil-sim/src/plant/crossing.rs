@@ -99,8 +99,7 @@ pub fn cross_course(
         let dt = case.stride_mm / course(x + 0.5 * dx).0;
         x = start + dx * (index + 1) as f64;
         let (_, preload_n) = course(x);
-        let balance =
-            Balance { preload_n, spring_n_per_mm: 0.0, arm_n: 0.0, axial: case.axial };
+        let balance = Balance { preload_n, spring_n_per_mm: 0.0, arm_n: 0.0, axial: case.axial };
         let local = wall.local(x);
         height += base - local.base_mm;
         base = local.base_mm;

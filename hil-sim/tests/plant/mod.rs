@@ -8,6 +8,7 @@ mod follow;
 mod grip;
 mod mismatch;
 mod precision;
+mod rollout;
 mod sensors;
 mod skipping;
 mod spread;
