@@ -4,15 +4,14 @@ use crate::rig::Rig;
 use proptest::prelude::*;
 
 /// A wheel of the prototype rolled over a step at constant speed, mm/s, and force, N.
-fn rolled(direction: Direction, load: Option<f64>, scale: f64, speed: f64, force: f64) -> LiftOff {
+fn rolled(direction: Direction, load: Option<f64>, speed: f64, force: f64) -> LiftOff {
     let tread = Tread::try_build(&Rig::prototype()).expect("a sound rig");
     let (from, until) = match direction {
         Direction::Deploy => (q16(-38_000_000), Q16::ZERO),
         Direction::Retract => (q16(25_000_000), q16(-14_000_000)),
     };
     let axial = load.map_or(Axial::Pushed, |load| Axial::Driven(Q16::from_num(load)));
-    let scale = Q16::from_num(scale);
-    let run = Run { direction, axial, scale, level: true, from, until };
+    let run = Run { direction, axial, scale: Q16::ONE, level: true, from, until };
     let mut state = TreadState::default();
     roll(&tread, &mut state, &run, |_| (Q16::from_num(speed), Q16::from_num(force))).lift
 }
@@ -32,7 +31,7 @@ fn a_crossing_is_that_of_a_fine_ring() {
         (Retract, Some(6.7), 15.0, 48.0, 2.2857, 0.753),
         (Retract, Some(6.7), 100.0, 150.0, 1.9792, 0.580),
     ] {
-        let got = rolled(direction, load, 1.0, speed, force);
+        let got = rolled(direction, load, speed, force);
         let off = got.gap.to_num::<f64>() / gap - 1.0;
         assert!(off.abs() < 0.007, "{direction:?} {load:?} {speed} {force}: {off}");
         let off = got.utilisation.to_num::<f64>() - used;
@@ -69,22 +68,6 @@ fn a_wheel_that_is_put_down_sinks_in_as_far_as_its_relaxed_tread_carries() {
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
-
-    #[test]
-    fn a_stiffer_tread_a_faster_wheel_or_less_force_opens_the_gap(
-        back in any::<bool>(),
-        speed in 3.0..20.0f64,
-        force in 25.0..100.0f64,
-    ) {
-        let direction = if back { Direction::Retract } else { Direction::Deploy };
-        let gap = |scale: f64, speed: f64, force: f64| {
-            rolled(direction, Some(6.7), scale, speed, force).gap.to_num::<f64>()
-        };
-        let at = gap(1.0, speed, force);
-        prop_assert!(gap(1.2, speed, force) > at * 1.005);
-        prop_assert!(gap(1.0, 2.0 * speed, force) > at);
-        prop_assert!(gap(1.0, speed, 0.8 * force) > at * 1.005);
-    }
 
     /// No force, no speed and no stiffness makes it overflow or panic.
     #[test]
