@@ -172,10 +172,7 @@ mod tests {
                 "column preload_n is missing: expected the columns x_mm, speed_mm_s, preload_n",
             ),
             ("x_mm,speed_mm_s,preload_n\n", "no row: expected at least one below the heading"),
-            (
-                &good.replace("30", "fast"),
-                "row 1, column speed_mm_s: `fast`: expected a number",
-            ),
+            (&good.replace("30", "fast"), "row 1, column speed_mm_s: `fast`: expected a number"),
             (
                 &good.replace("48", "-48"),
                 "row 2, column preload_n: -48: expected a value above 0, at most 1000 N",

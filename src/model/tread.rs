@@ -30,7 +30,6 @@ mod sums;
 use crate::numeric::{divide, high, sqrt};
 use crate::units::{Direction, Millimetres, Newtons, Q16, Ratio, Seconds, q16};
 use relaxation::Stride;
-use sums::Sums;
 
 pub use state::PitchedState;
 

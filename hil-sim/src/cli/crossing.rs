@@ -272,11 +272,9 @@ fn human(printed: &Printed<'_>) -> String {
         .map_or("frictionless".to_owned(), |load| format!("driven against {load:.2} N"));
     let how = match (&printed.course, printed.speed_mm_s, printed.preload_n) {
         (Some(course), ..) => format!("by {course}"),
-        (None, speed, preload) => format!(
-            "at {} mm/s under {} N",
-            speed.unwrap_or_default(),
-            preload.unwrap_or_default()
-        ),
+        (None, speed, preload) => {
+            format!("at {} mm/s under {} N", speed.unwrap_or_default(), preload.unwrap_or_default())
+        }
     };
     // Hardly pressed, it slides at any friction.
     let mu = |mu| if mu < 100.0 { number(mu, 3) } else { "> 100".to_owned() };

@@ -54,7 +54,7 @@ const fn ray(microradians: i64) -> Ray {
     while n < 30 {
         sums[n % 2] += if n % 4 < 2 { term } else { -term };
         n += 1;
-        term = (term * angle >> 60) / n as i128;
+        term = ((term * angle) >> 60) / n as i128;
     }
     let [cos, sin] = sums;
     Ray {

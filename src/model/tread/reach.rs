@@ -62,7 +62,8 @@ impl<const PITCH: u32, const ELEMENTS: usize> PitchedTread<PITCH, ELEMENTS> {
             Patch { low: (1 - high).max(-behind), high }
         };
         let floor = touched(near.floor.high, wall.lower).below(face);
-        let mut step = touched(near.step.high, wall.upper).from(top);
+        let upper = touched(near.upper, wall.upper);
+        let mut step = upper.from(top);
         if step.low == top {
             let deep = |place: i32| {
                 Rays::<PITCH, ELEMENTS>::at(place).is_some_and(|ray| wall.face(ray) < self.radius)
@@ -71,7 +72,7 @@ impl<const PITCH: u32, const ELEMENTS: usize> PitchedTread<PITCH, ELEMENTS> {
                 step.low -= 1;
             }
         }
-        Reach { face, top, floor, step }
+        Reach { face, top, upper: upper.high, floor, step }
     }
 }
 

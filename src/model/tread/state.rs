@@ -23,6 +23,8 @@ pub(super) struct Patch {
 pub(super) struct Reach {
     pub(super) face: i32,
     pub(super) top: i32,
+    /// From where on ahead the upper wall is out of reach.
+    pub(super) upper: i32,
     pub(super) floor: Patch,
     pub(super) step: Patch,
 }

@@ -98,7 +98,7 @@ impl<const PITCH: u32, const ELEMENTS: usize> PitchedTread<PITCH, ELEMENTS> {
         stride: &Stride,
         reach: &Reach,
     ) -> Sums {
-        let Reach { face, top, floor, step } = *reach;
+        let Reach { face, top, floor, step, .. } = *reach;
         let wall = self.wall(&state.frame);
         let ends = [-Rays::<PITCH, ELEMENTS>::BEHIND, Rays::<PITCH, ELEMENTS>::AHEAD];
         let lower = |ray: &Ray| Wall::level(wall.lower, ray);
@@ -140,46 +140,57 @@ impl<const PITCH: u32, const ELEMENTS: usize> Run<'_, PITCH, ELEMENTS> {
         distance: impl Fn(&Ray) -> i32,
     ) -> i32 {
         let rays = Rays::<PITCH, ELEMENTS>::between(patch.low, patch.high);
-        let Some(mut last) = rays.first() else { return i32::MIN };
-        let elements = &self.state.elements;
-        let mut number = self.state.frame.number(patch.low);
-        // A neighbour out of contact on the same facet shows where the pressure ends.
-        let mut before = if patch.low > from {
-            let ray = Rays::<PITCH, ELEMENTS>::at(patch.low - 1).unwrap_or(last);
-            self.pressure(elements.at(number.wrapping_sub(1)), distance(ray))
-        } else {
-            self.pressure(elements.at(number), distance(last))
+        let first = self.state.frame.number(patch.low);
+        // Of the element that many rays on, with its sign turned: what is known to be negative is
+        // multiplied with its sign, in one instruction.
+        let pull = |on: usize, ray: &Ray| {
+            let element = self.state.elements.at(first.wrapping_add(on));
+            -self.pressure(element, distance(ray))
         };
-        let (mut most, mut moves, mut tan) = (i32::MIN, 0, 0);
-        for ray in rays {
-            let pressure = self.pressure(elements.at(number), distance(ray));
-            number = number.wrapping_add(1);
-            most = most.max(pressure);
-            if pressure > 0 {
-                sums.add(pressure, ray);
-                moves += 1;
-                tan += i64::from(ray.tan);
-                if before <= 0 {
-                    sums.end::<LEVEL>(pressure, ray, before);
-                }
-            } else if before > 0 {
-                sums.end::<LEVEL>(before, last, pressure);
+        // A neighbour out of contact on the same facet shows where the pressure ends.
+        let outside = |there: bool, on: usize, place: i32| {
+            Rays::<PITCH, ELEMENTS>::at(place).filter(|_| there).map(|ray| pull(on, ray))
+        };
+        let mut before = outside(patch.low > from, usize::MAX, patch.low - 1);
+        let (mut least, mut on) = (i32::MAX, 0);
+        while let Some(ray) = rays.get(on) {
+            let now = pull(on, ray);
+            least = least.min(now);
+            if now >= 0 {
+                (before, on) = (Some(now), on + 1);
+                continue;
             }
-            (before, last) = (pressure, ray);
-        }
-        if before > 0
-            && patch.high < until
-            && let Some(ray) = Rays::<PITCH, ELEMENTS>::at(patch.high)
-        {
-            let pressure = self.pressure(elements.at(number), distance(ray));
-            sums.end::<LEVEL>(before, last, pressure.min(0));
-        }
-        if LEVEL {
-            sums.moves += moves << 16;
-            sums.tan += tan << 16;
+            if let Some(before) = before.filter(|before| *before >= 0) {
+                sums.end::<LEVEL>(-now, ray, -before);
+            }
+            // As long as they carry.
+            let (mut cos, mut sin, mut tan) = (0_i64, 0_i64, 0_i32);
+            let (mut last, begin) = ((now, ray), on);
+            for ray in rays.get(on..).unwrap_or_default() {
+                let now = pull(on, ray);
+                if now >= 0 {
+                    break;
+                }
+                least = least.min(now);
+                cos += i64::from(now) * i64::from(ray.cos);
+                sin += i64::from(now) * i64::from(ray.sin);
+                tan += ray.tan >> 8;
+                (last, on) = ((now, ray), on + 1);
+            }
+            sums.cos -= cos;
+            sums.sin -= sin;
+            if LEVEL {
+                sums.moves += ((on - begin) as i32) << 16;
+                sums.tan += i64::from(tan) << 24;
+            }
+            let place = patch.low + on as i32;
+            if let Some(next) = outside(place < until, on, place) {
+                sums.end::<LEVEL>(-last.0, last.1, -next.max(0));
+            }
+            before = None;
         }
         sums.visits += rays.len() as u32;
-        most
+        if rays.is_empty() { i32::MIN } else { -least }
     }
 
     /// Adds what the cell with the corner in it carries beside the halves of its two elements.
