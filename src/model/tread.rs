@@ -1,5 +1,5 @@
-//! The tread, rolled out: a viscoelastic ring over a step, in fixed point. The one place in the
-//! controller that knows rubber.
+//! The tread, rolled out: a viscoelastic ring over a step, in fixed point. The controller does not
+//! use it yet: it plans and learns by the reduced model.
 //!
 //! Elements lie along rays from the wheel's centre, 0.008 rad apart. A stride rolls the
 //! tread on by one of them. An element at depth d carries the pressure of the three-parameter
@@ -31,8 +31,8 @@ use relaxation::Stride;
 pub use state::TreadState;
 use state::{Element, Frame, Patch};
 
-/// Farthest from the face that a wheel is put down, mm: 200 strides of the largest wheel further it
-/// is still within the format.
+/// Farthest from the face that a wheel is put down, mm. Positions end at 512 mm; 200 strides of the
+/// largest wheel are 240 mm.
 const FARTHEST: Millimetres = q16(200_000_000);
 
 /// Largest change of the centre's height in a stride over the stride: steeper than any step that
