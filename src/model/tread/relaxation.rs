@@ -55,10 +55,10 @@ impl Stride {
     pub(super) const RELAXED: Self =
         Self { keeps: 0, takes: i32::MAX, took: 0, loads: 1 << 26, relieves: 0, relieved: 0 };
 
-    /// Duration over relaxation time, Q23, saturating below 256.
+    /// Duration over relaxation time, Q23, from 0 and saturating below 256.
     pub(super) fn ratio(duration: Seconds, per_tau: Q16) -> i32 {
         let product = i64::from(duration.to_bits()) * i64::from(per_tau.to_bits());
-        i32::try_from(product >> 9).unwrap_or(i32::MAX)
+        i32::try_from(product.max(0) >> 9).unwrap_or(i32::MAX)
     }
 }
 
@@ -123,6 +123,13 @@ mod tests {
             prop_assert!((q26(got.relieves) - excess * keeps).abs() < 1e-4);
             prop_assert!((q26(got.relieved) - excess * (mean - keeps)).abs() < 1e-4);
         }
+    }
+
+    #[test]
+    fn a_duration_that_is_none_is_no_time() {
+        assert_eq!(Stride::ratio(Q16::from_bits(-65_536), Q16::MAX), 0);
+        assert_eq!(Stride::ratio(Q16::MIN, Q16::MAX), 0);
+        assert_eq!(Stride::ratio(Q16::MAX, Q16::MAX), i32::MAX);
     }
 
     #[test]
