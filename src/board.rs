@@ -37,6 +37,7 @@ pub(crate) use line::HostLine;
 pub(crate) use pins::{Angle, Bridges, Button, CompressionSensor, PreloadSensor, Wheel, split};
 pub(crate) use text_log::TextLog;
 
+use embassy_stm32::interrupt::{Interrupt, InterruptExt, Priority};
 use embassy_stm32::peripherals::{DMA1_CH1, DMA1_CH2};
 use embassy_stm32::{
     Config, Peripherals, bind_interrupts, dma, exti, flash as flash_driver, interrupt, rcc,
@@ -99,7 +100,13 @@ fn clocks() -> Config {
 /// 0 of `PWR_CR5`, the manual and ST's headers have it at bit 8.
 pub(crate) fn init() -> Peripherals {
     stack::guard();
-    let mut p = embassy_stm32::init(Config::default());
+    let mut config = Config::default();
+    config.bdma_interrupt_priority = Priority::P1;
+    let mut p = embassy_stm32::init(config);
+    // The system timer, of the highest priority, ends a hang in any of these.
+    for interrupt in [Interrupt::TIM2, Interrupt::FLASH, Interrupt::EXTI15_10] {
+        interrupt.set_priority(Priority::P1);
+    }
     PWR.cr5().write_value(Cr5(0));
     rcc::reinit(clocks().rcc, &mut p.RCC);
     // At four wait states the core would wait at every line of code that the cache lacks. All

@@ -46,6 +46,10 @@ impl SetMemory for ParameterFlash {
             // SAFETY: a byte of flash. Volatile: what counts is that it is read.
             let _ = word.first().map(|byte| unsafe { core::ptr::from_ref(byte).read_volatile() });
         }
+        // What a read reports has interrupted the core once the read is complete and the core has
+        // refetched.
+        cortex_m::asm::dsb();
+        cortex_m::asm::isb();
         safety::unreadable() == before
     }
 

@@ -6,6 +6,8 @@
 //! The last pages of the 512 KiB are in use: one for image checksums, one for records of a lost
 //! supply, then the two slots of a parameter set.
 
+use core::ptr;
+
 use interstage::params::slots::SLOT_BYTES;
 use interstage::restart::page::{self, PAGE_BYTES, WORD_BYTES, Word};
 
@@ -36,9 +38,9 @@ pub(super) const IMAGE_CHECKSUMS: Page = Page(RECORDS.0 - PAGE_BYTES as u32);
 impl Page {
     pub(super) fn bytes(self) -> &'static page::Page {
         // SAFETY: inside flash, which is always mapped and holds plain bytes. It changes only
-        // before the tasks, and in a handler that does not return; readers read it again after
-        // each change.
-        unsafe { &*(self.0 as *const page::Page) }
+        // before the tasks, and in a handler that does not return; nobody holds the reference over
+        // a change, and `Open::end` lets no read pass one.
+        unsafe { &*ptr::with_exposed_provenance(self.0 as usize) }
     }
 
     /// Programs the double word of this number, which has to be blank; takes 0.1 ms, and up to
@@ -51,8 +53,9 @@ impl Page {
         // SAFETY: inside a page outside the image, which is only written through this pointer.
         // The chip takes the double word once both words have come.
         unsafe {
-            (place as *mut u32).write_volatile(low);
-            ((place + 4) as *mut u32).write_volatile(high);
+            let place: *mut u32 = ptr::with_exposed_provenance_mut(place as usize);
+            place.write_volatile(low);
+            place.add(1).write_volatile(high);
         }
         open.end()
     }
@@ -105,6 +108,8 @@ impl Open {
         FLASH.acr().modify(|w| w.set_dcrst(true));
         FLASH.acr().modify(|w| w.set_dcrst(false));
         FLASH.acr().modify(|w| w.set_dcen(self.cached));
+        // For the compiler, too: what it has read of the page is no longer true.
+        cortex_m::asm::dsb();
         !(status.progerr() || status.pgaerr() || status.pgserr() || status.wrperr())
     }
 }

@@ -1,9 +1,11 @@
 //! The watchdog, and the bridges' reaction to a debugger or a locked-up core.
 
-use cortex_m::peripheral::{DWT, SCB};
+use cortex_m::peripheral::DWT;
 use embassy_stm32::Peri;
-use embassy_stm32::peripherals::IWDG;
+use embassy_stm32::peripherals::{IWDG, TIM7};
+use embassy_stm32::timer::low_level::Timer;
 use embassy_stm32::wdg::IndependentWatchdog;
+use embassy_time::{Instant, TICK_HZ};
 use interstage::estimate::Place;
 use interstage::fault::Limit;
 use interstage::hal::Watchdog;
@@ -21,14 +23,16 @@ const UPDATE_ROUNDS: u32 = 42_500;
 
 pub(crate) struct Guard {
     dog: IndependentWatchdog<'static, IWDG>,
+    halts: HaltWatch,
     /// Position of the wheel by the record of the run before.
     pub(crate) place: Option<Place>,
 }
 
 impl Guard {
     /// The watchdog, not yet running.
-    pub(crate) fn new(watchdog: Peri<'static, IWDG>) -> Self {
-        Self { dog: IndependentWatchdog::new(watchdog, TIMEOUT_US), place: None }
+    pub(crate) fn new(watchdog: Peri<'static, IWDG>, timer: Peri<'static, TIM7>) -> Self {
+        let dog = IndependentWatchdog::new(watchdog, TIMEOUT_US);
+        Self { dog, halts: HaltWatch::new(timer), place: None }
     }
 
     /// Starts it; only a reset stops it.
@@ -40,7 +44,7 @@ impl Guard {
         let _ = (0..UPDATE_ROUNDS).any(|_| !updating());
         self.dog.pet();
         // A probe that flashes the image or resets the chip halts it.
-        was_halted();
+        self.halts.was_halted();
         break_on_damage();
         count_cycles();
         safety::watch_feeding();
@@ -55,7 +59,7 @@ impl Watchdog for Guard {
 
     fn keep(&mut self, snapshot: &DriveSnapshot) {
         retained::keep(snapshot);
-        if was_halted() {
+        if self.halts.was_halted() {
             let event = Event::Limit(Limit::CoreHalted);
             EXCHANGE.log(Entry { at: snapshot.tick, event });
         }
@@ -92,18 +96,40 @@ pub(crate) fn arm() {
     });
 }
 
-/// Whether a debugger has halted the core since the last call: by request, breakpoint or
-/// watchpoint. Neither the clock nor the watchdog can tell, which stop with the core. Source:
-/// ARMv7-M, the debug fault status register, whose bits stay set until a one is written.
-fn was_halted() -> bool {
-    // SAFETY: nothing else uses this register, and a write of ones clears it alone.
-    let status = unsafe { &(*SCB::PTR).dfsr };
-    let halts = status.read();
-    if halts != 0 {
-        // SAFETY: as above.
-        unsafe { status.write(halts) };
+/// Finds a halt of the core by two timers: the clock's stops with it, see [`arm`], TIM7 does not.
+/// What the core itself notes of a halt (DFSR) the probe clears.
+struct HaltWatch {
+    timer: Timer<'static, TIM7>,
+    /// By how much TIM7 is ahead of the clock, counts.
+    ahead: u16,
+}
+
+impl HaltWatch {
+    /// A count takes 2^7 us, so that a halt of 0.4 ms shows; all of them 8.4 s.
+    const SHIFT: u32 = 7;
+
+    fn new(timer: Peri<'static, TIM7>) -> Self {
+        let timer = Timer::new(timer);
+        let prescaler = (timer.get_clock_frequency().0 / TICK_HZ as u32) << Self::SHIFT;
+        timer.regs_core().psc().write_value((prescaler - 1) as u16);
+        timer.generate_update_event();
+        timer.start();
+        Self { timer, ahead: 0 }
     }
-    halts != 0
+
+    /// Whether the core has been halted since the last call.
+    fn was_halted(&mut self) -> bool {
+        let clock = (Instant::now().as_ticks() as u32 >> Self::SHIFT) as u16;
+        let ahead = self.timer.regs_core().cnt().read().cnt().wrapping_sub(clock);
+        // Both count in steps, at different moments.
+        let moved = ahead.wrapping_sub(self.ahead);
+        if matches!(moved, 0 | 1 | u16::MAX) {
+            return false;
+        }
+        self.ahead = ahead;
+        // In the loop with a host, time is the host's.
+        !cfg!(feature = "hil")
+    }
 }
 
 /// Starts the core's counter of cycles.

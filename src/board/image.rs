@@ -1,6 +1,6 @@
 //! Hash of the image, and whether the image is intact.
 
-use core::slice;
+use core::{ptr, slice};
 
 use cortex_m::peripheral::{SYST, syst};
 use interstage::restart::image_checksum;
@@ -34,8 +34,9 @@ pub(super) fn words() -> &'static [u32] {
     let first = &raw const __vector_table;
     let values = &raw const __edata as usize - &raw const __sdata as usize;
     let length = &raw const __sidata as usize + values - first as usize;
-    // SAFETY: flash from the aligned vectors to the end of the image, never written.
-    unsafe { slice::from_raw_parts(first, length / 4) }
+    // SAFETY: flash from the aligned vectors to the end of the image, never written. The linker's
+    // symbol is one word, so that the pointer is made of its address.
+    unsafe { slice::from_raw_parts(ptr::with_exposed_provenance(first as usize), length / 4) }
 }
 
 /// Half a period of 2 Hz, cycles of the oscillator that the chip starts on.
@@ -44,7 +45,7 @@ const HALF_PERIOD: u32 = 16_000_000 / 4;
 /// Runs first of all, before statics have their values: shows a damaged image by the light, in
 /// case the code that would log it no longer works. The light is off for half a period, the
 /// checksum included, and then on: a damaged image that restarts in a loop blinks. Needs only
-/// this function, [`checksums`] and some registers.
+/// this function, [`checksums`] and some registers: it may read and write no static in RAM.
 #[unsafe(export_name = "__pre_init")]
 extern "C" fn look() {
     let clock = Clock::start();

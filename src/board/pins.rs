@@ -47,7 +47,7 @@ pub(crate) fn split(
             preload: Bridge::new(p.TIM8, p.PC6, p.PC8.into(), p.PC9.into(), p.PB7),
             readback: Readback::new(p.ADC3, p.PB0, p.PB1),
         },
-        watchdog: Guard::new(p.IWDG),
+        watchdog: Guard::new(p.IWDG, p.TIM7),
         button: Button::new(p.PC13, p.EXTI13),
         console: Console::new(console),
         journal: TextLog::new(frames),

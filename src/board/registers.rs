@@ -4,7 +4,7 @@
 //! | block | what the library lacks |
 //! |---|---|
 //! | ADC1 to ADC3, DMA1 | the ring's place without an interrupt, the flag of injected results |
-//! | TIM1, TIM8 | a duty without a check that can panic in the tick; the cut of both bridges from a handler |
+//! | TIM1, TIM8 | one pulse of some periods; a duty without a check that can panic in the tick; a break's flags; the cut of both bridges from a handler |
 //! | TIM5 | the encoder's input filter |
 //! | SPI1 | a frame of which no step waits for a flag without end |
 //! | FLASH | prefetch, option bytes, error correction; writes before and after the tasks |
@@ -22,7 +22,7 @@ pub(crate) use pac::bdma::Ch as DmaChannel;
 pub(crate) use pac::gpio::vals::Moder;
 pub(crate) use pac::pwr::regs::Cr5;
 pub(crate) use pac::timer::TimAdv;
-pub(crate) use pac::timer::vals::FilterValue;
+pub(crate) use pac::timer::vals::{FilterValue, Ocm};
 pub(crate) use pac::{DBGMCU, EXTI, FLASH, GPIOA, IWDG, PWR, RCC, SPI1, SYSCFG, TIM1, TIM5, TIM8};
 
 /// A peripheral that the library hands out once, and its registers.

@@ -173,7 +173,7 @@ fn panic(info: &PanicInfo<'_>) -> ! {
 }
 
 /// Words of the image per step of the checksum.
-const PART: usize = 256;
+const PART: usize = 384;
 
 /// Interval between two steps: the image takes six seconds, and a thousandth of the core.
 const INTERVAL: Duration = Duration::from_millis(50);

@@ -75,6 +75,8 @@ pub struct Chip {
     exti: Exti,
     ports: [Gpio; 7],
     time: TimeBase,
+    /// TIM7.
+    basic: TimeBase,
     encoder: Encoder,
     /// The timers of drive and pre-tightener.
     motors: [Pwm; 2],
@@ -122,6 +124,7 @@ impl Chip {
             exti: Exti::new(0),
             ports,
             time: TimeBase::default(),
+            basic: TimeBase::basic(),
             encoder: Encoder::new([false; 2]),
             motors: [Pwm::new(false), Pwm::new(false)],
             adc: Adc::default(),
@@ -151,12 +154,12 @@ impl Chip {
     /// interrupted flash operation.
     pub fn reset(&mut self, cause: Cause, vectors: u32, now: u64) -> Option<Change> {
         let torn = self.flash.reset();
+        for (bridge, motor) in self.bridges.iter_mut().zip(&self.motors) {
+            bridge.reset(motor.high(now), now);
+        }
         let old = std::mem::replace(self, Self::new(vectors));
         // A loss of power clears the flags of earlier resets.
         let earlier = if cause == Cause::Power { 0 } else { old.rcc.flags() };
-        if cause != Cause::Power {
-            self.system.control.keep(&old.system.control);
-        }
         self.rcc = Rcc::new(cause, earlier);
         for (port, (driven, levels)) in old.ports.iter().map(Gpio::outside).enumerate() {
             self.ports[port] = Gpio::new(port, driven, levels);
@@ -203,6 +206,7 @@ impl Chip {
     pub fn advance(&mut self, now: u64) {
         self.system.advance(now);
         self.time.advance(now);
+        self.basic.advance(now);
         self.adc.advance(now);
         self.readback.advance(now);
         if let Some(frame) = self.spi.over(now) {
@@ -243,17 +247,20 @@ impl Chip {
     /// stands still with it. Source: RM0440, `DBGMCU_APB1FZR1` and `DBGMCU_APB2FZR`.
     pub(crate) fn halt(&mut self, cycles: u64, now: u64) {
         let frozen = [self.debug.get(0x08), self.debug.get(0x10)];
-        self.system.halt(cycles);
+        self.system.tick.freeze(cycles);
         self.counter.freeze(cycles);
         if frozen[0] & 1 != 0 {
             self.time.freeze(cycles, now);
+        }
+        if frozen[0] & 1 << 5 != 0 {
+            self.basic.freeze(cycles, now);
         }
         if frozen[0] & 1 << 12 != 0 {
             self.watchdog.freeze(cycles);
         }
         for (motor, bit) in self.motors.iter_mut().zip([11, 13]) {
             if frozen[1] >> bit & 1 != 0 {
-                motor.freeze(true, cycles);
+                motor.freeze(true, cycles, now);
             }
         }
         self.settle(now);
@@ -262,7 +269,7 @@ impl Chip {
     /// The core goes on.
     pub(crate) fn resume(&mut self, now: u64) {
         for motor in &mut self.motors {
-            motor.freeze(false, 0);
+            motor.freeze(false, 0, now);
         }
         self.settle(now);
     }
@@ -346,6 +353,7 @@ impl Chip {
             (4, self.flash.requests()),
             (23, self.exti.requests(0x03E0)),
             (28, self.time.requests()),
+            (55, self.basic.requests()),
             (40, self.exti.requests(0xFC00) || self.defects.button_storm),
         ];
         let exceptions = &mut self.system.exceptions;
@@ -363,6 +371,7 @@ impl Chip {
         let due = [
             self.system.deadline(),
             self.time.deadline(),
+            self.basic.deadline(),
             self.motors[0].deadline(),
             self.motors[1].deadline(),
             self.adc.deadline(),
@@ -382,6 +391,7 @@ impl Chip {
     fn block(&mut self, block: Block) -> &mut dyn Peripheral {
         match block {
             Block::Time => &mut self.time,
+            Block::Basic => &mut self.basic,
             Block::Encoder => &mut self.encoder,
             Block::Motor(index) => &mut self.motors[index],
             Block::Watchdog => &mut self.watchdog,

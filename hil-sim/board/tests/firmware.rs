@@ -93,7 +93,7 @@ const QUANTITIES: [Quantity; 4] = [
     ("gap, mm", |c| c.gap_mm, 0.025, 60.0 * 0.027),
     ("preload, N", |c| c.preload_n, 0.46, 0.0),
     ("speed, mm/s", |c| c.speed_mm_s, 60.0 * 0.025, 60.0),
-    ("corner force, N", |c| c.corner_force_n, 0.55, 0.0),
+    ("corner force, N", |c| c.corner_force_n, 1.33, 0.0),
 ];
 
 /// Codes by which a sensor at rest differs from itself a millisecond before or after: six deviations

@@ -7,7 +7,8 @@ use interstage::params::link::{FrameReader, ToBoard, ToHost, frame};
 use interstage::params::service::{Origin, PIECE, Piece, Request, Response};
 use interstage::rig::Rig;
 use rig_board::bench::Bench;
-use rig_board::peripherals::flash::Cut;
+use rig_board::chip::map::PARAMETER_SETS;
+use rig_board::peripherals::flash::{Cut, Wrong};
 use rig_board::peripherals::rcc::Cause;
 use rig_board::rtt::Probe;
 
@@ -128,6 +129,25 @@ fn a_stored_set_is_active_after_a_loss_of_power() {
     assert_eq!(board.active(), stored);
     let strays = board.bench.machine().chip().strays().count();
     assert_eq!(strays, 0);
+}
+
+/// The chip breaks the timers by a flag of its own, which a reset of the fault has to clear.
+#[test]
+fn a_damaged_set_stops_the_drive_until_the_fault_is_reset() {
+    let mut board = Board::idle();
+    assert!(board.store(&set()));
+    let place = PARAMETER_SETS + 2 * PIECE as u32;
+    board.bench.machine_mut().spoil(place, Wrong::Check).expect("flash");
+    board.active();
+    board.until("fault 151");
+    // A fault is held for a tenth of a second at least.
+    for _ in 0..150 {
+        board.bench.step().expect("runs");
+    }
+    board.bench.send(b'0').expect("runs");
+    board.until("mode: idle");
+    board.bench.send(b's').expect("runs");
+    board.until("deploying: cruise");
 }
 
 #[test]

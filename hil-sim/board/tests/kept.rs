@@ -23,7 +23,7 @@ const CHECKSUMS: u32 = RECORDS - PAGE_BYTES as u32;
 const DAMAGED: &str = "image: a bit has turned over";
 
 /// Longest time of two checks of the image, ms.
-const CHECKED_MS: u32 = 16_000;
+const CHECKED_MS: u32 = 12_500;
 
 fn page(board: &Board, address: u32) -> Vec<u8> {
     let mut bytes = vec![0; PAGE_BYTES];

@@ -3,8 +3,8 @@
 use hil_sim::scenario::Scenario;
 use interstage::restart::Stopped;
 use rig_board::bench::{Bench, STEP};
-use rig_board::chip::Pin;
-use rig_board::core::Register;
+use rig_board::chip::{Pin, description};
+use rig_board::core::{Access, Bus, Register};
 use rig_board::faults::Fault;
 use rig_board::peripherals::flash::Wrong;
 use rig_board::peripherals::iwdg::LSI_RANGE_HZ;
@@ -250,6 +250,51 @@ fn a_fault_after_a_long_halt_of_the_core_has_its_cause_before_it_in_the_log() {
         assert!(halt.is_some() && fault > halt, "{:#?}", board.log);
         assert!(board.machine().restarts().is_empty(), "the watchdog stood still");
     }
+}
+
+/// The timers' own dead man: nothing masks it, and no software takes part. At full speed.
+#[test]
+fn a_tick_that_hangs_loses_the_pwm_within_three_milliseconds() {
+    let mut board = Board::moving();
+    while board.bench.plant().truth().tread_mm_s < 29.5 {
+        board.step();
+    }
+    let tick = board.function("interstage::tick::Controller::step_into");
+    let machine = board.machine();
+    assert!(machine.run_to(tick, machine.now() + 2 * STEP).expect("runs"), "no tick");
+    machine.hang().expect("hangs");
+    let from = board.position_mm();
+    let driven: Vec<bool> = (0..70).map(|_| board.step().drives.drive != 0.0).collect();
+    let moved = board.position_mm() - from;
+    assert!(driven[0] && !driven[3..].contains(&true), "{driven:?}");
+    assert!(moved < 0.3, "{moved} mm");
+}
+
+/// First words of the interrupts' enable bits and priorities.
+const ENABLED: u32 = 0xE000_E100;
+const PRIORITIES: u32 = 0xE000_E400;
+
+/// The system timer finds every hang but its own and that of the supply's end.
+#[test]
+fn the_system_timer_preempts_every_interrupt_but_the_supply_s() {
+    let mut board = Board::idle();
+    let none = board.function("DefaultHandler") | 1;
+    let machine = board.machine();
+    let handlers: Vec<u32> =
+        (0..102).map(|at| machine.word(0x0800_0040 + 4 * at).expect("a vector")).collect();
+    let now = machine.now();
+    let chip = machine.chip_mut();
+    let mut read = |address| chip.read(Access { address, size: 4, pc: 0, now });
+    // The library enables some that nothing handles, and nothing requests.
+    let urgent: Vec<u32> = (0..102)
+        .filter(|number| handlers[*number as usize] != none)
+        .filter(|number| {
+            let enabled = read(ENABLED + number / 32 * 4) >> (number % 32) & 1 != 0;
+            enabled && read(PRIORITIES + number / 4 * 4) >> (number % 4 * 8) & 0xFF == 0
+        })
+        .collect();
+    let supply = description::interrupt("PVD_PVM").expect("described");
+    assert_eq!(urgent, [u32::from(supply)]);
 }
 
 /// The bit of `memcpy` after which no start comes to its first word.

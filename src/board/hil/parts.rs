@@ -91,7 +91,7 @@ pub(crate) fn split(
         compression_sensor: Analog(|given| given.compression_sensor),
         arm_angle: Angle,
         motors: Bridges { _low: pins.map(|pin| Output::new(pin, Level::Low, Speed::Low)) },
-        watchdog: Guard::new(p.IWDG),
+        watchdog: Guard::new(p.IWDG, p.TIM7),
         button: Button,
         console: Console::new(console),
         journal: TextLog::new(frames),

@@ -10,7 +10,7 @@ use embassy_stm32::adc::{
     Adc, AdcChannel, AdcConfig, CONTINUOUS, DefaultInstance, Resolution, RingBufferedAdc, Rovsm,
     RxDma, SampleTime, Trovs,
 };
-use embassy_stm32::interrupt::typelevel::Binding;
+use embassy_stm32::interrupt::typelevel::{Binding, Interrupt};
 use embassy_stm32::{Peri, dma};
 use embassy_time::{Duration, Timer};
 use interstage::hal::AnalogInput;
@@ -79,8 +79,11 @@ impl<T: DefaultInstance + Peripheral<Registers = Registers>> Analog<T> {
         };
         // The amplifiers are buffered: the shortest sampling time of the slow channels suffices.
         let sequence = [(pin.degrade_adc(), SampleTime::CYCLES12_5)];
-        let ring = ring.0.init([0; RING]);
-        let written = Written(ring.as_ptr());
+        let ring: *mut [u16; RING] = ring.0.init([0; RING]);
+        let written = Written(ring.cast());
+        // SAFETY: the only reference to it. The driver lends its memory to DMA and looks at none of
+        // it, so that it is read through `written` alone.
+        let ring = unsafe { &mut *ring };
         let mut converter = Adc::new(adc, config).into_ring_buffered(
             dma,
             ring,
@@ -90,12 +93,10 @@ impl<T: DefaultInstance + Peripheral<Registers = Registers>> Analog<T> {
             Exten::DISABLED,
         );
         converter.start();
-        // No interrupt at the ring's half or end.
+        // No interrupt at the ring's half or end. The channel's own switches must not be written
+        // while it is enabled, which it is since before the driver gave it back.
+        D::Interrupt::disable();
         let channel = D::registers();
-        channel.cr().modify(|w| {
-            w.set_htie(false);
-            w.set_tcie(false);
-        });
         let registers = T::registers();
         Self { registers, channel, written, left: RING as u16, _converter: converter }
     }

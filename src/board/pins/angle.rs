@@ -18,7 +18,7 @@ use interstage::hal::AngleBus;
 use interstage::sense::angle::{field, is_flagged};
 use interstage::sense::raw::{AngleFrame, BusFault};
 
-use crate::board::registers;
+use crate::board::{SYSCLK_HZ, registers};
 
 /// Commands that read a register, bit 14, with even parity in bit 15: the angle at 0x3FFF,
 /// diagnostics and gain at 0x3FFD, the errors at 0x0001.
@@ -29,9 +29,9 @@ const READ_ERRORS: u16 = 0x4001;
 /// 170 MHz / 32. The sensor takes 10 MHz; the next divider would give 10.6.
 const CLOCK: Hertz = Hertz(5_312_500);
 
-/// Least time from select to clock, and between frames: 350 ns or 60 cycles. The delay loops
-/// once more than this, with three cycles at least a loop.
-const SELECT_ROUNDS: u32 = 20;
+/// From select to clock, and between frames, the sensor wants 350 ns; with half as much again for
+/// edges and clock 525 ns. A round of the delay takes three cycles at least.
+const SELECT_ROUNDS: u32 = SYSCLK_HZ / 1_000_000 * 525 / 1000 / 3 + 1;
 
 /// Polls of the bus for a frame of 512 cycles: a poll takes four at least.
 const FRAME_ROUNDS: u32 = 500;

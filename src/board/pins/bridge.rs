@@ -12,18 +12,22 @@ use embassy_stm32::timer::complementary_pwm::{
 };
 use embassy_stm32::timer::low_level::CountingMode;
 use embassy_stm32::timer::simple_pwm::{PwmPin, PwmPinConfig};
-use embassy_stm32::timer::{
-    AdvancedInstance4Channel, BkIn1, BreakInputPin, Ch1, Channel, TimerPin,
-};
+use embassy_stm32::timer::{AdvancedInstance4Channel, BkIn1, BreakInputPin, Ch1, TimerPin};
 use interstage::hal::Motors;
 use interstage::sense::raw::BridgeCodes;
 use interstage::units::MotorCommand;
 
 use super::readback::Readback;
-use crate::board::registers::{Peripheral, TimAdv};
+use crate::board::registers::{Ocm, Peripheral, TimAdv};
+
+/// Periods of the PWM, 50 us each, that a tick gives: 2.5 ms.
+const DEAD_MAN: u16 = 50;
 
 /// One bridge in phase/enable control: PWM chops, the direction line sets the sign, the enable
 /// line wakes the bridge.
+///
+/// The timer makes one pulse of [`DEAD_MAN`] periods and stops, its output low: each tick has to
+/// begin it again. A tick that does not come loses the motor's voltage without any software.
 ///
 /// It is never dropped: that would release the lines that hold the bridge off.
 pub(crate) struct Bridge<T: AdvancedInstance4Channel> {
@@ -77,30 +81,41 @@ impl<T: AdvancedInstance4Channel + Peripheral<Registers = TimAdv>> Bridge<T> {
         pwm.set_break_input_pin_enable(true);
         // With the outputs off the timer keeps the PWM line low.
         pwm.set_off_state_selection_idle(Ossi::IDLE_LEVEL);
-        pwm.set_duty(Channel::Ch1, 0);
-        pwm.enable(Channel::Ch1);
-        pwm.set_break_enable(true);
+        pwm.set_repetition_counter(DEAD_MAN - 1);
+        let registers = T::registers();
+        registers.cr1().modify(|w| w.set_opm(true));
         let period = pwm.get_max_duty();
-        Self {
+        let bridge = Self {
             pwm: ManuallyDrop::new(pwm),
-            registers: T::registers(),
+            registers,
             period,
             forward: ManuallyDrop::new(forward),
             enable: ManuallyDrop::new(enable),
             _stop: ManuallyDrop::new(stop),
-        }
+        };
+        bridge.chop(0);
+        // Low at the begin of a period, where a pulse stops, and high behind the compare.
+        registers.ccmr_output(0).modify(|w| w.set_ocm(0, Ocm::PWM_MODE2));
+        registers.ccer().modify(|w| w.set_cce(0, true));
+        registers.bdtr().modify(|w| w.set_bke(0, true));
+        bridge
     }
 
     fn stopped(&self) -> bool {
         !self.pwm.get_master_output_enable()
     }
 
-    /// Re-enables the outputs; without effect while the break input is active.
+    /// Re-enables the outputs; without effect while a break is active. One by the chip itself
+    /// (damaged flash) holds them off until its own flag is cleared as well.
     fn rearm(&mut self) {
+        self.registers.sr().modify(|w| {
+            w.set_bif(0, false);
+            w.set_sbif(false);
+        });
         self.pwm.set_master_output_enable(true);
     }
 
-    /// Sets direction at once and duty at the next period.
+    /// Sets direction and duty, and begins a pulse of the timer.
     fn set(&mut self, command: MotorCommand) {
         if !command.enable {
             self.enable.set_low();
@@ -115,9 +130,13 @@ impl<T: AdvancedInstance4Channel + Peripheral<Registers = TimAdv>> Bridge<T> {
         self.enable.set_high();
     }
 
-    /// Sets the duty, counts of the period, from the next period on.
+    /// Begins a pulse with this duty, counts of the period, of which one stays low: the stopped
+    /// counter stands there.
     fn chop(&self, counts: u32) {
-        self.registers.ccr(0).write(|w| w.set_ccr(counts as u16));
+        self.registers.ccr(0).write(|w| w.set_ccr((self.period - counts).max(1) as u16));
+        // The update loads the duty and the repetitions; in this mode it also stops the counter.
+        self.registers.egr().write(|w| w.set_ug(true));
+        self.registers.cr1().modify(|w| w.set_cen(true));
     }
 }
 

@@ -10,6 +10,7 @@ pub const PARAMETER_SETS: u32 = 0x0808_0000 - 2 * SLOT_BYTES as u32;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Block {
     Time,
+    Basic,
     Encoder,
     Motor(usize),
     Watchdog,
@@ -53,9 +54,10 @@ const ON: Clock = (0, 0);
 
 /// First address, bytes, block, name in the reference manual, clock. Source: RM0440, table 3
 /// and chapter 7.
-const BLOCKS: [(u32, u32, Block, &str, Clock); 19] = [
+const BLOCKS: [(u32, u32, Block, &str, Clock); 20] = [
     (0x4000_0000, 0x400, Block::Time, "TIM2", (APB1, 0)),
     (0x4000_0C00, 0x400, Block::Encoder, "TIM5", (APB1, 3)),
+    (0x4000_1400, 0x400, Block::Basic, "TIM7", (APB1, 5)),
     (0x4000_3000, 0x400, Block::Watchdog, "IWDG", ON),
     (0x4000_7000, 0x400, Block::Pwr, "PWR", (APB1, 28)),
     (0x4001_0000, 0x030, Block::Syscfg, "SYSCFG", (APB2, 0)),

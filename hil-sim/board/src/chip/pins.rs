@@ -76,41 +76,54 @@ pub struct Motor {
 /// A bridge's lines, integrated over time.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Bridge {
-    /// Signed duty and enable now.
-    duty: f64,
-    on: bool,
+    /// Its lines at present.
+    lines: Lines,
     since: u64,
-    /// Integrals since `from`: duty times cycles, and cycles enabled.
-    duty_cycles: f64,
+    /// Cycles for which its timer was high up to then.
+    high: u64,
+    /// Integrals since `from`: signed cycles of a PWM that is high, and cycles enabled.
+    driven: i64,
     enabled: u64,
     from: u64,
 }
 
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Lines {
+    /// The PWM line is the timer's; else it is high or low.
+    timed: bool,
+    high: bool,
+    forward: bool,
+    on: bool,
+}
+
 impl Bridge {
-    fn integrate(&mut self, now: u64) {
+    /// Books up to `now`, when the timer was high for so many cycles since its start; the lines
+    /// are others from then on.
+    fn set(&mut self, lines: Lines, high: u64, now: u64) {
         let cycles = now.saturating_sub(self.since);
-        self.since = now;
-        if self.on {
-            self.duty_cycles += self.duty * cycles as f64;
+        if self.lines.on {
+            let constant = if self.lines.high { cycles } else { 0 };
+            let driven = if self.lines.timed { high.wrapping_sub(self.high) } else { constant };
+            self.driven += if self.lines.forward { driven as i64 } else { -(driven as i64) };
             self.enabled += cycles;
         }
+        (self.lines, self.high, self.since) = (lines, high, now);
     }
 
-    fn set(&mut self, duty: f64, on: bool, now: u64) {
-        if (duty, on) != (self.duty, self.on) {
-            self.integrate(now);
-            (self.duty, self.on) = (duty, on);
-        }
+    /// Books up to a reset, which starts its timer over.
+    pub(super) fn reset(&mut self, high: u64, now: u64) {
+        self.set(self.lines, high, now);
+        self.high = 0;
     }
 
-    fn take(&mut self, now: u64) -> Motor {
-        self.integrate(now);
+    fn take(&mut self, high: u64, now: u64) -> Motor {
+        self.set(self.lines, high, now);
         let cycles = now.saturating_sub(self.from).max(1);
         let motor = Motor {
-            duty: if self.enabled == 0 { 0.0 } else { self.duty_cycles / self.enabled as f64 },
+            duty: if self.enabled == 0 { 0.0 } else { self.driven as f64 / self.enabled as f64 },
             enabled: self.enabled as f64 / cycles as f64,
         };
-        (self.duty_cycles, self.enabled, self.from) = (0.0, 0, now);
+        (self.driven, self.enabled, self.from) = (0, 0, now);
         motor
     }
 }
@@ -191,7 +204,7 @@ impl Chip {
 
     /// Mean commands of drive and pre-tightener since the last call.
     pub fn take_motors(&mut self, now: u64) -> [Motor; 2] {
-        [self.bridges[0].take(now), self.bridges[1].take(now)]
+        [0, 1].map(|index| self.bridges[index].take(self.motors[index].high(now), now))
     }
 
     /// A frame on the angle sensor's bus.
@@ -223,15 +236,15 @@ impl Chip {
             let reaches = self.role(wired.stop) == Role::Alternate(wired.stop_function);
             let open = reaches && self.level(wired.stop) && !self.defects.stop_shorted;
             self.motors[index].set_break(open, now);
-            let is_output = self.role(wired.pwm) == Role::Alternate(wired.pwm_function);
             let floats = index == 0 && self.defects.drive_bridge_floats;
-            let pwm = if floats { 1.0 } else { 0.0 };
-            let duty = if is_output { self.motors[index].duty(0) } else { pwm };
             let out = |pin: Pin| self.ports[pin.0].puts_out(pin.1);
-            let sense = if out(wired.forward) { 1.0 } else { -1.0 };
-            let high = floats && self.role(wired.enable) != Role::Output;
-            let on = out(wired.enable) || high;
-            self.bridges[index].set(sense * duty, on, now);
+            let lines = Lines {
+                timed: self.role(wired.pwm) == Role::Alternate(wired.pwm_function),
+                high: floats && self.role(wired.pwm) != Role::Output,
+                forward: out(wired.forward),
+                on: out(wired.enable) || floats && self.role(wired.enable) != Role::Output,
+            };
+            self.bridges[index].set(lines, self.motors[index].high(now), now);
         }
     }
 }

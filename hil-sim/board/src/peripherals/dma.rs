@@ -27,10 +27,6 @@ const COMPLETE: u32 = 1 << 1;
 const HALF: u32 = 1 << 2;
 const ERROR: u32 = 1 << 3;
 
-/// Bits of the configuration that may be written while a channel is enabled: itself and its
-/// interrupts.
-const ALWAYS: u32 = ENABLE | COMPLETE | HALF | ERROR;
-
 #[derive(Clone, Copy, Debug, Default)]
 struct Channel {
     config: u32,
@@ -155,7 +151,7 @@ impl Peripheral for Dma {
                 if next & MEMORY_TO_MEMORY != 0 {
                     return None;
                 }
-                if enabled && next & ENABLE != 0 && (next ^ c.config) & !ALWAYS != 0 {
+                if enabled && next & ENABLE != 0 && next != c.config {
                     self.broken = Some(Rule::DmaEnabled);
                     return Some(());
                 }

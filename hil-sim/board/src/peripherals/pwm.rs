@@ -1,6 +1,7 @@
-//! A timer with four PWM channels and a break input: TIM1 and TIM8.
+//! A timer with PWM on channel 1 and a break input: TIM1 and TIM8.
 //!
-//! Source: RM0440, advanced-control timers; the lock is in `TIMx_BDTR`.
+//! Source: RM0440, advanced-control timers: repetition counter, one-pulse mode, PWM modes, break
+//! function; the lock is in `TIMx_BDTR`.
 
 use super::encoder::filter_cycles;
 use super::registers::{Kept, Registers};
@@ -15,18 +16,24 @@ const CCER: u32 = 0x20;
 const CNT: u32 = 0x24;
 const PSC: u32 = 0x28;
 const ARR: u32 = 0x2C;
+const RCR: u32 = 0x30;
 const CCR1: u32 = 0x34;
 const BDTR: u32 = 0x44;
 const AF1: u32 = 0x60;
 
 const ENABLE: u32 = 1;
-/// Counting up, edge-aligned, not one-shot.
-const PLAIN: u32 = ENABLE | 1 << 1 | 1 << 2 | 1 << 7;
+/// The next update event stops the counter.
+const ONE_PULSE: u32 = 1 << 3;
+/// Counting up, edge-aligned.
+const PLAIN: u32 = ENABLE | 1 << 1 | 1 << 2 | ONE_PULSE | 1 << 7;
 const ALL: u32 = u32::MAX;
 const MOE: u32 = 1 << 15;
 const BREAK_ENABLE: u32 = 1 << 12;
 const BREAK_HIGH: u32 = 1 << 13;
+/// Of `SR`: a break by the pin, and one by the chip itself. The outputs stay off until the latter
+/// is cleared, which is possible only once its cause has gone.
 const BREAK_FLAG: u32 = 1 << 7;
+const SYSTEM_BREAK_FLAG: u32 = 1 << 13;
 
 /// Of `BDTR`: the level of the lock, and the fields that level 1 and level 2 protect.
 const LOCK: u32 = 3 << 8;
@@ -40,7 +47,7 @@ const REGISTERS: [Kept; 15] = [
     Kept { offset: CCER, reset: 0, mask: 0x33_FFFF },
     Kept { offset: PSC, reset: 0, mask: 0xFFFF },
     Kept { offset: ARR, reset: 0xFFFF, mask: 0xFFFF },
-    Kept { offset: 0x30, reset: 0, mask: 0xFFFF },
+    Kept { offset: RCR, reset: 0, mask: 0xFFFF },
     Kept { offset: CCR1, reset: 0, mask: 0xFFFF },
     Kept { offset: CCR1 + 4, reset: 0, mask: 0xFFFF },
     Kept { offset: CCR1 + 8, reset: 0, mask: 0xFFFF },
@@ -55,14 +62,20 @@ const REGISTERS: [Kept; 15] = [
 pub struct Pwm {
     registers: Registers,
     flags: u32,
-    /// Cycle at which the counter was zero, while it runs.
+    /// Cycle at which the counter was zero and the repetition counter at `repeats`, while it runs.
     origin: u64,
-    /// In use until the next update: prescaler, period, compares.
+    /// Value of the counter while it does not.
+    stopped: u64,
+    /// In use until the next update: prescaler, period, compare, repetitions.
     prescaler: u64,
     period: u64,
-    compares: [u32; 4],
-    /// Cycle of the next update event.
+    compare: u64,
+    repeats: u64,
+    /// Cycle of the next update event that loads something or stops the counter.
     update: u64,
+    /// Cycles for which the output was high up to the cycle `since`.
+    high: u64,
+    since: u64,
     /// `BDTR` has been written: `LOCK` stays as it is.
     lock_settled: bool,
     broken: Option<Rule>,
@@ -70,7 +83,7 @@ pub struct Pwm {
     pin: bool,
     /// Cycle at which the filter takes the break input for active.
     breaks: u64,
-    /// A break by the chip itself: core locked up, supply low, flash damaged. It is not filtered.
+    /// A break by the chip itself: core locked up, flash damaged. It is not filtered.
     system: bool,
     /// It stands still with the core: no output is on.
     frozen: bool,
@@ -83,10 +96,14 @@ impl Pwm {
             registers: Registers::new(&REGISTERS, &[], &[0x08, 0x0C]),
             flags: 0,
             origin: 0,
+            stopped: 0,
             prescaler: 1,
             period: 0x1_0000,
-            compares: [0; 4],
+            compare: 0,
+            repeats: 0,
             update: u64::MAX,
+            high: 0,
+            since: 0,
             lock_settled: false,
             broken: None,
             pin,
@@ -98,6 +115,10 @@ impl Pwm {
 
     fn runs(&self) -> bool {
         self.registers.get(CR1) & ENABLE != 0
+    }
+
+    fn counter(&self, now: u64) -> u64 {
+        if self.runs() { (now - self.origin) / self.prescaler % self.period } else { self.stopped }
     }
 
     /// Bits of a register that the lock protects.
@@ -117,30 +138,41 @@ impl Pwm {
         }
     }
 
-    fn mode(&self, channel: u32) -> u32 {
-        let word = self.registers.get(CCMR1 + channel / 2 * 4) >> (channel % 2 * 8);
-        word >> 4 & 7 | word >> 13 & 8
-    }
-
-    fn is_preloaded(&self, channel: u32) -> bool {
-        let word = self.registers.get(CCMR1 + channel / 2 * 4);
-        word >> (channel % 2 * 8 + 3) & 1 != 0
-    }
-
-    /// Part of the period in which channel `channel` (from 0) is high at its pin.
-    pub fn duty(&self, channel: u32) -> f64 {
-        let enable = self.registers.get(CCER) >> (4 * channel);
+    /// Cycles up to `now` for which channel 1 was high at its pin.
+    pub fn high(&self, now: u64) -> u64 {
+        let enable = self.registers.get(CCER);
+        let passed = now.saturating_sub(self.since);
         if self.frozen || self.registers.get(BDTR) & MOE == 0 || enable & 1 == 0 {
-            return 0.0;
+            return self.high;
         }
-        let part = f64::from(self.compares[channel as usize]) / self.period as f64;
-        let high = match (self.mode(channel), self.runs()) {
-            (5, _) => 1.0,
-            (6, true) => part.min(1.0),
-            (7, true) => 1.0 - part.min(1.0),
-            _ => 0.0,
+        // Cycles of a period, and of its first part.
+        let (period, first) = (self.period * self.prescaler, self.compare * self.prescaler);
+        let in_first = |cycle: u64| {
+            let counted = cycle.saturating_sub(self.origin);
+            let (full, rest) = (counted / period, counted % period);
+            full * first.min(period) + rest.min(first)
         };
-        if enable & 2 == 0 { high } else { 1.0 - high }
+        let in_first = if self.runs() {
+            in_first(self.since + passed) - in_first(self.since)
+        } else if self.stopped < self.compare {
+            passed
+        } else {
+            0
+        };
+        let word = self.registers.get(CCMR1);
+        let active = match word >> 4 & 7 | word >> 13 & 8 {
+            5 => passed,
+            6 => in_first,
+            7 => passed - in_first,
+            _ => 0,
+        };
+        self.high + if enable & 2 == 0 { active } else { passed - active }
+    }
+
+    /// Books the output up to `now`, before something changes.
+    fn book(&mut self, now: u64) {
+        self.high = self.high(now);
+        self.since = now;
     }
 
     /// Sets the level at the break input's pin.
@@ -150,7 +182,8 @@ impl Pwm {
     }
 
     /// Stands still, without an output, or goes on after so many cycles of that.
-    pub const fn freeze(&mut self, frozen: bool, cycles: u64) {
+    pub fn freeze(&mut self, frozen: bool, cycles: u64, now: u64) {
+        self.book(now);
         self.frozen = frozen;
         self.origin = self.origin.wrapping_add(cycles);
         self.update = self.update.saturating_add(cycles);
@@ -184,37 +217,36 @@ impl Pwm {
         }
     }
 
-    /// Loads the preloaded values: an update event.
-    fn load(&mut self) {
+    /// An update event: loads the preloaded values, starts the counters over, and ends a pulse.
+    fn load(&mut self, now: u64) {
         self.prescaler = u64::from(self.registers.get(PSC)) + 1;
         self.period = u64::from(self.registers.get(ARR)) + 1;
-        for channel in 0..4 {
-            self.compares[channel as usize] = self.registers.get(CCR1 + 4 * channel);
+        self.compare = self.registers.get(CCR1).into();
+        self.repeats = self.registers.get(RCR).into();
+        (self.origin, self.stopped, self.update) = (now, 0, u64::MAX);
+        let control = self.registers.get(CR1);
+        if control & ONE_PULSE != 0 {
+            self.registers.set(CR1, control & !ENABLE);
         }
+    }
+
+    /// Notes the next update event while the counter runs: the counter's overflow with the
+    /// repetition counter at zero.
+    fn await_update(&mut self, now: u64) {
         self.update = u64::MAX;
+        if self.runs() {
+            let cycles = self.prescaler * self.period * (self.repeats + 1);
+            self.update = self.origin + ((now - self.origin) / cycles + 1) * cycles;
+        }
     }
 
-    fn next_update(&self, now: u64) -> u64 {
-        let cycles = self.prescaler * self.period;
-        self.origin + ((now - self.origin) / cycles + 1) * cycles
-    }
-
-    /// Applies a write to period or compare, at once or with the next update.
+    /// Applies a write to period, compare or repetitions, at once or with the next update.
     fn renew(&mut self, offset: u32, now: u64) {
-        let channel = offset.wrapping_sub(CCR1) / 4;
-        let waits = match offset {
-            PSC => true,
-            ARR => self.registers.get(CR1) >> 7 & 1 != 0,
-            _ => self.is_preloaded(channel),
-        };
-        if waits {
-            if self.runs() {
-                self.update = self.next_update(now);
-            }
-        } else if offset == ARR {
-            self.period = u64::from(self.registers.get(ARR)) + 1;
-        } else {
-            self.compares[channel as usize] = self.registers.get(offset);
+        let value = u64::from(self.registers.get(offset));
+        match offset {
+            ARR if self.registers.get(CR1) >> 7 & 1 == 0 => self.period = value + 1,
+            CCR1 if self.registers.get(CCMR1) >> 3 & 1 == 0 => self.compare = value,
+            _ => self.await_update(now),
         }
     }
 }
@@ -224,13 +256,13 @@ impl Peripheral for Pwm {
         match offset {
             SR => Some(self.flags),
             EGR => Some(0),
-            CNT if self.runs() => Some(((now - self.origin) / self.prescaler % self.period) as u32),
-            CNT => Some(0),
+            CNT => Some(self.counter(now) as u32),
             _ => self.registers.read(offset),
         }
     }
 
     fn write(&mut self, offset: u32, mut write: Write, now: u64) -> Option<()> {
+        self.advance(now);
         if let Some(old) = self.registers.read(offset) {
             let changed = write.onto(old) ^ old;
             let locked = self.locked(offset);
@@ -244,28 +276,36 @@ impl Peripheral for Pwm {
             self.lock_settled |= offset == BDTR;
         }
         match offset {
-            SR => self.flags &= !(write.mask & !write.value),
-            CNT => self.origin = now.wrapping_sub(u64::from(write.value) * self.prescaler),
+            SR => {
+                let kept = if self.is_system_break() { SYSTEM_BREAK_FLAG } else { 0 };
+                self.flags &= !(write.mask & !write.value & !kept);
+            }
+            CNT => {
+                self.stopped = write.value.into();
+                self.origin = now.wrapping_sub(self.stopped * self.prescaler);
+            }
             EGR if write.ones() & !1 == 0 => {
                 if write.ones() & 1 != 0 {
-                    self.load();
-                    self.origin = now;
+                    self.load(now);
                 }
             }
             CR1 if write.ones() & !(PLAIN | 0x300) == 0 => {
-                let ran = self.runs();
+                let (ran, counter) = (self.runs(), self.counter(now));
                 self.registers.write(CR1, write)?;
-                if self.runs() && !ran {
-                    self.origin = now;
-                    self.update = self.next_update(now);
+                match (ran, self.runs()) {
+                    (false, true) => self.origin = now.wrapping_sub(counter * self.prescaler),
+                    (true, false) => self.stopped = counter,
+                    _ => {}
                 }
+                self.await_update(now);
             }
             EGR | CR1 => return None,
             BDTR => {
                 let held = self.registers.get(BDTR) & MOE;
                 self.registers.write(BDTR, write)?;
                 let broken = self.is_break_active() && self.breaks <= now;
-                let active = self.is_system_break() || broken;
+                let flagged = self.flags & SYSTEM_BREAK_FLAG != 0;
+                let active = flagged || self.is_system_break() || broken;
                 if active && held == 0 {
                     // While the break is active the outputs stay off.
                     self.registers.set(BDTR, self.registers.get(BDTR) & !MOE);
@@ -276,7 +316,7 @@ impl Peripheral for Pwm {
                 self.registers.write(AF1, write)?;
                 self.rearm(now);
             }
-            PSC | ARR | 0x34..=0x40 => {
+            PSC | ARR | RCR | CCR1 => {
                 self.registers.write(offset, write)?;
                 self.renew(offset, now);
             }
@@ -296,11 +336,17 @@ impl Peripheral for Pwm {
 
     fn advance(&mut self, now: u64) {
         if self.update <= now {
-            self.load();
+            let at = self.update;
+            self.book(at);
+            self.load(at);
+        }
+        self.book(now);
+        if self.is_system_break() {
+            self.flags |= SYSTEM_BREAK_FLAG;
         }
         if self.breaks <= now && self.registers.get(BDTR) & MOE != 0 {
             self.registers.set(BDTR, self.registers.get(BDTR) & !MOE);
-            self.flags |= BREAK_FLAG;
+            self.flags |= if self.is_system_break() { 0 } else { BREAK_FLAG };
         }
     }
 }
@@ -334,13 +380,65 @@ mod tests {
     #[test]
     fn a_preloaded_compare_acts_with_the_next_period() {
         let mut timer = running();
-        timer.advance(timer.deadline());
+        timer.advance(PERIOD);
         write(&mut timer, CCR1, 2125, 3 * PERIOD + 100);
-        assert_eq!(timer.duty(0), 0.0);
+        assert_eq!(timer.high(4 * PERIOD), 0);
         assert_eq!(timer.deadline(), 4 * PERIOD);
         timer.advance(4 * PERIOD);
-        assert_eq!(timer.duty(0), 0.25);
-        assert_eq!(timer.duty(1), 0.0, "another channel");
+        assert_eq!(timer.high(5 * PERIOD + 100), 2125 + 100);
+        assert_eq!(timer.high(5 * PERIOD + 8000), 2 * 2125);
+    }
+
+    /// One pulse of 50 periods at a duty of three quarters in this PWM mode, begun at cycle 0.
+    fn pulse(mode: u32) -> Pwm {
+        let mut timer = running();
+        write(&mut timer, CCMR1, mode << 4 | 8, 0);
+        write(&mut timer, CCR1, 2125, 0);
+        write(&mut timer, RCR, 49, 0);
+        write(&mut timer, CR1, 1 << 7 | ONE_PULSE, 0);
+        write(&mut timer, EGR, 1, 0);
+        write(&mut timer, CR1, 1 << 7 | ONE_PULSE | ENABLE, 0);
+        timer
+    }
+
+    #[test]
+    fn one_pulse_ends_after_its_repetitions_with_the_counter_at_zero() {
+        let end = 50 * PERIOD;
+        // Mode 1 leaves the output high: the counter at zero is below the compare.
+        for (mode, high, after) in [(7, 50 * 6375, 0), (6, 50 * 2125, 1000)] {
+            let mut timer = pulse(mode);
+            assert_eq!(timer.deadline(), end);
+            timer.advance(end);
+            assert_eq!(timer.read(CR1, end).map(|word| word & ENABLE), Some(0), "{mode}");
+            assert_eq!((timer.read(CNT, end + 9), timer.high(end)), (Some(0), high), "{mode}");
+            assert_eq!(timer.high(end + 1000), high + after, "{mode}");
+        }
+    }
+
+    #[test]
+    fn an_update_by_software_begins_the_pulse_and_its_period_again() {
+        let mut timer = pulse(7);
+        let again = 20 * PERIOD + 1000;
+        write(&mut timer, EGR, 1, again);
+        assert_eq!(timer.read(CR1, again).map(|word| word & ENABLE), Some(0), "an update ends it");
+        write(&mut timer, CR1, 1 << 7 | ONE_PULSE | ENABLE, again);
+        assert_eq!(timer.deadline(), again + 50 * PERIOD);
+        assert_eq!(timer.high(again + PERIOD), 21 * 6375);
+    }
+
+    #[test]
+    fn a_break_by_the_chip_keeps_the_outputs_off_until_its_flag_is_cleared() {
+        let mut timer = running();
+        timer.set_system_break(true, 500);
+        timer.advance(500);
+        write(&mut timer, SR, 0, 600);
+        assert_eq!(timer.read(SR, 600), Some(SYSTEM_BREAK_FLAG), "its cause is still there");
+        timer.set_system_break(false, 700);
+        write(&mut timer, BDTR, 0xFB400, 800);
+        assert!(!moe(&mut timer), "flagged");
+        write(&mut timer, SR, !SYSTEM_BREAK_FLAG, 900);
+        write(&mut timer, BDTR, 0xFB400, 1000);
+        assert!(moe(&mut timer));
     }
 
     #[test]
@@ -377,6 +475,5 @@ mod tests {
         timer.set_system_break(true, 500);
         timer.advance(500);
         assert!(!moe(&mut timer));
-        assert_eq!(timer.duty(0), 0.0);
     }
 }

@@ -38,12 +38,6 @@ impl System {
         }
     }
 
-    /// A debugger halts the core for so many cycles: the system timer stands still.
-    pub fn halt(&mut self, cycles: u64) {
-        self.control.halt();
-        self.tick.freeze(cycles);
-    }
-
     /// Priorities of four exceptions from `first` on, as a word.
     fn priorities(&self, first: u32) -> u32 {
         (0..4).fold(0, |word, byte| {

@@ -1,7 +1,7 @@
-//! A counter with four compare registers that keeps time: TIM2.
+//! A counter with four compare registers that keeps time: TIM2; and the same without them: TIM7.
 //!
 //! It counts up with prescaler and reload, and sets a flag when it reaches a compare
-//! register or overflows. Its registers are 32 bits wide.
+//! register or overflows. The registers of TIM2 are 32 bits wide, of TIM7 16.
 
 use super::registers::{Kept, Registers};
 use super::{Peripheral, Write};
@@ -24,17 +24,21 @@ const FLAGS: u32 = 0x1F;
 /// Directions, one-pulse mode, alternate clocks: none of them modelled.
 const PLAIN: u32 = ENABLE | 1 << 1 | OVERFLOW_ONLY | 1 << 7;
 
-const REGISTERS: [Kept; 4] = [
-    Kept { offset: CR1, reset: 0, mask: PLAIN },
-    Kept { offset: DIER, reset: 0, mask: FLAGS },
-    Kept { offset: PSC, reset: 0, mask: 0xFFFF },
-    Kept { offset: ARR, reset: ALL, mask: ALL },
-];
+const fn registers(flags: u32, reload: u32) -> [Kept; 4] {
+    [
+        Kept { offset: CR1, reset: 0, mask: PLAIN },
+        Kept { offset: DIER, reset: 0, mask: flags },
+        Kept { offset: PSC, reset: 0, mask: 0xFFFF },
+        Kept { offset: ARR, reset: reload, mask: reload },
+    ]
+}
 
 /// The timer.
 #[derive(Clone, Debug)]
 pub struct TimeBase {
     registers: Registers,
+    /// Flags: one, and one for each compare register.
+    bits: u32,
     flags: u32,
     /// Cycle at which the counter was zero, while it runs.
     origin: u64,
@@ -52,10 +56,11 @@ impl Default for TimeBase {
     fn default() -> Self {
         Self {
             registers: Registers::new(
-                &REGISTERS,
+                &registers(FLAGS, ALL),
                 &[CCR1, CCR1 + 4, CCR1 + 8, CCR1 + 12],
                 &[0x04, 0x08, 0x18, 0x1C],
             ),
+            bits: 5,
             flags: 0,
             origin: 0,
             seen: 0,
@@ -67,6 +72,12 @@ impl Default for TimeBase {
 }
 
 impl TimeBase {
+    /// Without compare registers.
+    pub fn basic() -> Self {
+        let registers = Registers::new(&registers(1, 0xFFFF), &[], &[0x04]);
+        Self { registers, bits: 1, ..Self::default() }
+    }
+
     fn runs(&self) -> bool {
         self.registers.get(CR1) & ENABLE != 0
     }
@@ -99,7 +110,7 @@ impl TimeBase {
     fn update(&mut self, now: u64) {
         let counts = self.counts(now);
         if now >= self.flag_due {
-            for bit in 0..5 {
+            for bit in 0..self.bits {
                 if self.meets(self.seen, self.value_of(bit)).is_some_and(|at| at <= counts) {
                     self.flags |= 1 << bit;
                 }
@@ -113,7 +124,7 @@ impl TimeBase {
     /// Computes when the next flags are set.
     fn schedule(&mut self) {
         let next = |flags: u32| {
-            let bits = (0..5).filter(|bit| flags >> bit & 1 != 0);
+            let bits = (0..self.bits).filter(|bit| flags >> bit & 1 != 0);
             let counts = bits.filter_map(|bit| self.meets(self.seen, self.value_of(bit))).min();
             counts.map_or(u64::MAX, |count| self.origin.wrapping_add(count * self.prescaler))
         };

@@ -16,10 +16,9 @@ pub(super) const RESETS: [(&str, &str); 7] = [
 ];
 
 /// Fields.
-pub(super) const FIELDS: [(&str, &str); 10] = [
+pub(super) const FIELDS: [(&str, &str); 9] = [
     ("TIM*.SR.*", "flags, cleared by 0; the description has them as written"),
     ("TIM*.EGR.UG", "a command: reads as 0"),
-    ("TIM1.CNT.CNT TIM8.CNT.CNT", "a stopped counter reads as 0 here"),
     ("IWDG.KR.KEY", "a command: reads as 0"),
     ("EXTI.SWIER1.*", "a command: the model clears it at once, the chip with the flag"),
     ("SPI1.DR8.DR SPI1.DR.DR CRC.DR*", "what is written is not what is read"),

@@ -73,29 +73,19 @@ pub struct Control {
     /// Status of configurable faults and of the hard fault.
     faults: u32,
     hard: u32,
-    /// Status of debug events. Only a loss of power clears it.
-    debug: u32,
     /// The program requests a reset.
     pub wants_reset: bool,
 }
 
 impl Control {
     pub(super) fn new(vectors: u32) -> Self {
-        // The engine does not report the address of a fault.
-        let zeros = [MMFAR, BFAR, AFSR];
+        // The engine does not report the address of a fault. The status of debug events is what
+        // probe-rs 0.32 leaves of it (armv7m.rs): it clears it as it attaches and whenever it asks
+        // for the core's status.
+        let zeros = [DFSR, MMFAR, BFAR, AFSR];
         let mut registers = Registers::new(&REGISTERS, &[CPACR, DEMCR, FPDSCR], &zeros);
         registers.set(VTOR, vectors);
-        Self { registers, faults: 0, hard: 0, debug: 0, wants_reset: false }
-    }
-
-    /// A debugger halts the core: `HALTED`.
-    pub const fn halt(&mut self) {
-        self.debug |= 1;
-    }
-
-    /// After a reset that is no loss of power.
-    pub const fn keep(&mut self, before: &Self) {
-        self.debug = before.debug;
+        Self { registers, faults: 0, hard: 0, wants_reset: false }
     }
 
     /// Address of an exception's vector.
@@ -144,7 +134,6 @@ impl Control {
             AIRCR => 0xFA05_0000 | u32::from(exceptions.group()) << 8,
             CFSR => self.faults,
             HFSR => self.hard,
-            DFSR => self.debug,
             _ => self.registers.read(offset)?,
         })
     }
@@ -174,7 +163,7 @@ impl Control {
             }
             CFSR => self.faults &= !write.ones(),
             HFSR => self.hard &= !write.ones(),
-            DFSR => self.debug &= !write.ones(),
+            DFSR => {}
             CPUID | MMFAR | BFAR | AFSR => return None,
             _ => self.registers.write(offset, write)?,
         }

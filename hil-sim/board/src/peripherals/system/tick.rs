@@ -30,7 +30,7 @@ impl Default for SysTick {
 
 impl SysTick {
     /// Stands still for so many cycles, as the core does.
-    pub(super) const fn freeze(&mut self, cycles: u64) {
+    pub const fn freeze(&mut self, cycles: u64) {
         self.zero = self.zero.saturating_add(cycles);
     }
 
