@@ -1,12 +1,14 @@
 //! The interface of a debug probe: RTT channels, reset, memory. Behind it is a real probe or
 //! the emulated board.
 
+mod channels;
 #[cfg(feature = "probe")]
 mod real;
 mod reconnecting;
 
 use std::time::Duration;
 
+pub use channels::{ChannelError, Channels, Rtt};
 #[cfg(feature = "probe")]
 pub use real::RealPort;
 pub use reconnecting::ReconnectingPort;
@@ -33,7 +35,8 @@ pub trait Port {
     /// channels up.
     fn up(&mut self, channel: u32) -> Result<Vec<u8>, PortError>;
 
-    /// Sends bytes down an RTT channel, as many as there is room for; returns how many.
+    /// Sends bytes down an RTT channel, as many as there is room for; returns how many. None go to
+    /// a board that has restarted since it was last read, and no key before its log was read.
     fn down(&mut self, channel: u32, bytes: &[u8]) -> Result<usize, PortError>;
 
     fn reset(&mut self) -> Result<(), PortError>;
@@ -41,6 +44,7 @@ pub trait Port {
     /// Reads memory.
     fn memory(&mut self, address: u32, into: &mut [u8]) -> Result<(), PortError>;
 
-    /// Waits before the next poll of the board; returns how long.
+    /// Waits before the next poll of the board; returns how long this and the accesses since the
+    /// last call took.
     fn pass(&mut self) -> Result<Duration, PortError>;
 }

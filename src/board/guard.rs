@@ -16,7 +16,7 @@ use super::registers::{self, DBGMCU, SYSCFG};
 use super::{EXCHANGE, retained, safety};
 
 /// Time-out of the watchdog, us, by the nominal 32 kHz of its oscillator.
-const TIMEOUT_US: u32 = 100_000;
+pub(super) const TIMEOUT_US: u32 = 100_000;
 
 /// Polls for the update of the time-out, of four cycles at least: 1 ms, six times what it takes.
 const UPDATE_ROUNDS: u32 = 42_500;

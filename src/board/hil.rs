@@ -30,6 +30,9 @@ type Begin = fn(Spawner, Channels);
 /// Runs the host's line in thread mode, where it advances time when every task waits; the tasks
 /// that otherwise run there have an executor of their own.
 pub(crate) fn run((channels, host): (Channels, (UpChannel, DownChannel)), begin: Begin) -> ! {
+    defmt::warn!(
+        "image for the loop with a host: it moves no motor; `cargo rig flash` puts the other back"
+    );
     serve::serve(host, || {
         interrupt::UART4.set_priority(Priority::P15);
         THREADS.start(interrupt::UART4).spawn(boot(channels, begin).unwrap());

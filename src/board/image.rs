@@ -46,8 +46,11 @@ const HALF_PERIOD: u32 = 16_000_000 / 4;
 /// case the code that would log it no longer works. The light is off for half a period, the
 /// checksum included, and then on: a damaged image that restarts in a loop blinks. Needs only
 /// this function, [`checksums`] and some registers: it may read and write no static in RAM.
+///
+/// Before all that it drives the bridges' lines low: in reset they have their pull-downs alone.
 #[unsafe(export_name = "__pre_init")]
 extern "C" fn look() {
+    light::hold_bridges();
     let clock = Clock::start();
     let (now, first) = checksums();
     if first.is_some_and(|first| first != now) {

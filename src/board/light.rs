@@ -8,7 +8,7 @@ use embassy_sync::signal::Signal;
 use embassy_time::{Duration, Timer};
 use interstage::hal::{Indicator, Light};
 
-use super::registers::{GPIOA, Moder, RCC};
+use super::registers::{GPIOA, GPIOC, Moder, RCC};
 
 /// Half a period of 4 Hz.
 const HALF_PERIOD: Duration = Duration::from_millis(125);
@@ -20,6 +20,18 @@ pub(super) fn glow() {
     RCC.ahb2enr().modify(|w| w.set_gpioaen(true));
     GPIOA.bsrr().write(|w| w.set_bs(5, true));
     GPIOA.moder().modify(|w| w.set_moder(5, Moder::OUTPUT));
+}
+
+/// Drives PWM, direction and enable of both bridges low by registers alone, before anything else
+/// runs: a reset leaves zeros to put out.
+pub(super) fn hold_bridges() {
+    RCC.ahb2enr().modify(|w| {
+        w.set_gpioaen(true);
+        w.set_gpiocen(true);
+    });
+    for (port, pins) in [(GPIOA, [8, 9, 10]), (GPIOC, [6, 8, 9])] {
+        port.moder().modify(|w| pins.map(|pin| w.set_moder(pin, Moder::OUTPUT)));
+    }
 }
 
 /// Signals [`show`].

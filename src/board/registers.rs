@@ -11,7 +11,7 @@
 //! | PWR, EXTI | the supply's detector; the boost, see [`super::init`] |
 //! | SYSCFG, DBGMCU | breaks of the timers by the chip itself, what freezes with the core |
 //! | IWDG | whether its time-out has been taken over |
-//! | RCC, GPIOA | causes of a reset; the light before anything runs |
+//! | RCC, GPIOA, GPIOC | causes of a reset; the light and the bridges' lines before anything runs |
 
 use embassy_stm32::pac;
 use embassy_stm32::peripherals;
@@ -23,7 +23,9 @@ pub(crate) use pac::gpio::vals::Moder;
 pub(crate) use pac::pwr::regs::Cr5;
 pub(crate) use pac::timer::TimAdv;
 pub(crate) use pac::timer::vals::{FilterValue, Ocm};
-pub(crate) use pac::{DBGMCU, EXTI, FLASH, GPIOA, IWDG, PWR, RCC, SPI1, SYSCFG, TIM1, TIM5, TIM8};
+pub(crate) use pac::{
+    DBGMCU, EXTI, FLASH, GPIOA, GPIOC, IWDG, PWR, RCC, SPI1, SYSCFG, TIM1, TIM5, TIM8,
+};
 
 /// A peripheral that the library hands out once, and its registers.
 pub(crate) trait Peripheral {

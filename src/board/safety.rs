@@ -43,7 +43,8 @@ pub(super) fn restart() -> ! {
 /// fast end of its oscillator.
 const HANG_MS: u32 = 75;
 
-static UNFED: AtomicU32 = AtomicU32::new(0);
+/// Milliseconds since the last feeding.
+pub(super) static UNFED: AtomicU32 = AtomicU32::new(0);
 
 pub(super) fn fed() {
     UNFED.store(0, Ordering::Relaxed);

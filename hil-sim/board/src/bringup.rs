@@ -9,6 +9,7 @@ use hil_sim::probe::{Port, PortError};
 
 use super::bench::Bench;
 use super::core::{Access, Bus};
+use super::port::Usb;
 
 /// Travel of the tread that an eye sees, mm.
 const SEEN_MM: f64 = 0.5;
@@ -18,23 +19,48 @@ const RESET_MS: u32 = 300;
 const PERIPHERALS: u32 = 0x4000_0000;
 
 /// A bench with a probe at its board and a person beside it.
-#[derive(Clone)]
-pub struct Attended<'a>(Rc<RefCell<Bench<'a>>>);
+pub struct Attended<'a> {
+    bench: Rc<RefCell<Bench<'a>>>,
+    /// The probe's accesses take time.
+    usb: Option<Usb>,
+    /// Time that they took and that has not passed at the bench, us.
+    owed: u64,
+    /// Milliseconds since the last pause.
+    spent: u64,
+}
 
 impl<'a> Attended<'a> {
     /// This bench, its motor supply switched off.
     pub fn new(mut bench: Bench<'a>) -> Self {
         bench.wiring_mut().switched_off = true;
-        Self(Rc::new(RefCell::new(bench)))
+        Self { bench: Rc::new(RefCell::new(bench)), usb: None, owed: 0, spent: 0 }
+    }
+
+    /// The same with a probe on USB; otherwise an access takes no time.
+    pub fn on_usb(self) -> Self {
+        Self { usb: Some(Usb::default()), ..self }
+    }
+
+    /// Lets the time of so many accesses pass.
+    fn access(&mut self, accesses: u32) -> Result<(), PortError> {
+        let Some(usb) = &mut self.usb else { return Ok(()) };
+        self.owed += (0..accesses).map(|_| usb.access_us()).sum::<u64>();
+        while self.owed >= 1000 {
+            self.owed -= 1000;
+            self.step()?;
+        }
+        Ok(())
+    }
+
+    fn step(&mut self) -> Result<(), PortError> {
+        self.spent += 1;
+        self.bench.borrow_mut().step().map(|_| ()).map_err(gone)
     }
 
     /// The person, whose motions `asked` allows.
     pub fn person<O: Operator>(&self, asked: O) -> Person<'a, O> {
-        Person { bench: Rc::clone(&self.0), asked, tread_mm: self.tread_mm() }
-    }
-
-    fn tread_mm(&self) -> f64 {
-        tread_mm(&self.0.borrow())
+        let tread_mm = tread_mm(&self.bench.borrow());
+        Person { bench: Rc::clone(&self.bench), asked, tread_mm }
     }
 }
 
@@ -49,7 +75,8 @@ fn gone(error: impl std::fmt::Display) -> PortError {
 
 impl Port for Attended<'_> {
     fn up(&mut self, channel: u32) -> Result<Vec<u8>, PortError> {
-        let mut bench = self.0.borrow_mut();
+        self.access(3)?;
+        let mut bench = self.bench.borrow_mut();
         match channel {
             1 => Ok(bench.take_frames()),
             2 => bench.line_take().map_err(gone),
@@ -58,7 +85,8 @@ impl Port for Attended<'_> {
     }
 
     fn down(&mut self, channel: u32, bytes: &[u8]) -> Result<usize, PortError> {
-        let mut bench = self.0.borrow_mut();
+        self.access(4)?;
+        let mut bench = self.bench.borrow_mut();
         match channel {
             1 => bench.line_send(bytes).map_err(gone),
             _ => Err(PortError::Board(format!("nothing sends down channel {channel}"))),
@@ -66,11 +94,12 @@ impl Port for Attended<'_> {
     }
 
     fn reset(&mut self) -> Result<(), PortError> {
-        self.0.borrow_mut().hold_reset(1).map_err(gone)
+        self.bench.borrow_mut().hold_reset(1).map_err(gone)
     }
 
     fn memory(&mut self, address: u32, into: &mut [u8]) -> Result<(), PortError> {
-        let mut bench = self.0.borrow_mut();
+        self.access(1)?;
+        let mut bench = self.bench.borrow_mut();
         let machine = bench.machine_mut();
         if address < PERIPHERALS {
             return machine.peek(address, into).map_err(gone);
@@ -83,8 +112,8 @@ impl Port for Attended<'_> {
     }
 
     fn pass(&mut self) -> Result<Duration, PortError> {
-        self.0.borrow_mut().step().map_err(gone)?;
-        Ok(Duration::from_millis(1))
+        self.step()?;
+        Ok(Duration::from_millis(std::mem::take(&mut self.spent)))
     }
 }
 

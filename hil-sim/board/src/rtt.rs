@@ -2,7 +2,9 @@
 //! written without the program taking part.
 //!
 //! Source: SEGGER, RTT implementation (wiki, "Real Time Transfer"), layout of the
-//! control block.
+//! control block; what makes a handle stale: probe-rs 0.32, `rtt/channel.rs`.
+
+use hil_sim::probe::{ChannelError, Channels, Rtt};
 
 use super::core::CoreError;
 use super::error::ImageError;
@@ -18,10 +20,20 @@ const CHANNEL: u32 = 24;
 /// Largest plausible ring, bytes.
 const LARGEST: u32 = 64 * 1024;
 
-/// A probe with the address of the control block.
-#[derive(Clone, Copy, Debug)]
+/// A probe with the address of the control block, and what it knows of the channels.
+#[derive(Debug)]
 pub struct Probe {
     block: u32,
+    channels: Channels<Offsets>,
+}
+
+/// Read offset of each channel up after its last read, as probe-rs keeps it.
+type Offsets = [Option<u32>; 8];
+
+/// Channels at this control block.
+struct Link<'a> {
+    block: u32,
+    machine: &'a mut Machine,
 }
 
 /// A ring: address of its record and its buffer, bytes, write and read offsets.
@@ -36,59 +48,107 @@ struct Ring {
 impl Probe {
     /// Finds the control block of the image.
     pub fn of(machine: &Machine) -> Result<Self, ImageError> {
-        Ok(Self { block: machine.image().symbol(SYMBOL)? })
+        Ok(Self { block: machine.image().symbol(SYMBOL)?, channels: Channels::default() })
     }
 
+    /// Makes the channels unknown until the program sets them up again.
+    pub fn forget(&mut self, machine: &mut Machine) -> Result<(), CoreError> {
+        self.channels.forget();
+        machine.poke(self.block, &[0; MARK.len()])
+    }
+
+    /// Takes the bytes that channel `index` has sent.
+    pub fn up(&mut self, machine: &mut Machine, index: u32) -> Result<Vec<u8>, CoreError> {
+        self.channels.up(&mut Link { block: self.block, machine }, index)
+    }
+
+    /// Sends bytes down channel `index`; returns how many it had room for.
+    pub fn down(
+        &mut self,
+        machine: &mut Machine,
+        index: u32,
+        bytes: &[u8],
+    ) -> Result<usize, CoreError> {
+        self.channels.down(&mut Link { block: self.block, machine }, index, bytes)
+    }
+}
+
+impl Link<'_> {
     /// The ring of a channel, upwards or downwards; none before the program has set it
     /// up.
-    fn ring(self, machine: &Machine, index: u32, down: bool) -> Result<Option<Ring>, CoreError> {
+    fn ring(&self, index: u32, down: bool) -> Result<Option<Ring>, CoreError> {
         let mut mark = [0; 16];
-        machine.peek(self.block, &mut mark)?;
+        self.machine.peek(self.block, &mut mark)?;
         if mark != *MARK {
             return Ok(None);
         }
-        let ups = machine.word(self.block + 16)?;
+        let ups = self.machine.word(self.block + 16)?;
         let at = self.block + HEAD + CHANNEL * (if down { ups } else { 0 } + index);
-        let word = |offset: u32| machine.word(at + offset);
+        let word = |offset: u32| self.machine.word(at + offset);
         let ring = Ring { at, buffer: word(4)?, size: word(8)?, write: word(12)?, read: word(16)? };
         let sound = ring.size <= LARGEST && ring.write < ring.size && ring.read < ring.size;
         Ok(sound.then_some(ring))
     }
 
-    /// Makes the channels unknown until the program sets them up again.
-    pub fn forget(self, machine: &mut Machine) -> Result<(), CoreError> {
-        machine.poke(self.block, &[0; MARK.len()])
+    /// The ring of a channel up, if its read offset is as it was left.
+    fn known(&self, offsets: &Offsets, index: u32) -> Result<Ring, ChannelError<CoreError>> {
+        let ring = self.ring(index, false)?.ok_or(ChannelError::Stale)?;
+        match offsets[index as usize] {
+            Some(read) if read != ring.read => Err(ChannelError::Stale),
+            _ => Ok(ring),
+        }
+    }
+}
+
+impl Rtt for Link<'_> {
+    type Handle = Offsets;
+    type Error = CoreError;
+
+    fn attach(&mut self) -> Result<Option<Offsets>, CoreError> {
+        Ok(self.ring(0, false)?.map(|_| Offsets::default()))
     }
 
-    /// Takes the bytes that channel `index` has sent.
-    pub fn up(self, machine: &mut Machine, index: u32) -> Result<Vec<u8>, CoreError> {
-        let Some(ring) = self.ring(machine, index, false)? else { return Ok(Vec::new()) };
+    fn read(
+        &mut self,
+        offsets: &mut Offsets,
+        index: u32,
+    ) -> Result<Vec<u8>, ChannelError<CoreError>> {
+        let ring = self.known(offsets, index)?;
         let mut taken = Vec::new();
         let mut read = ring.read;
         while read != ring.write {
             let end = if ring.write > read { ring.write } else { ring.size };
             let mut part = vec![0; (end - read) as usize];
-            machine.peek(ring.buffer + read, &mut part)?;
+            self.machine.peek(ring.buffer + read, &mut part)?;
             taken.extend(part);
             read = end % ring.size;
         }
         if !taken.is_empty() {
-            machine.poke(ring.at + 16, &read.to_le_bytes())?;
+            self.machine.poke(ring.at + 16, &read.to_le_bytes())?;
         }
+        offsets[index as usize] = Some(read);
         Ok(taken)
     }
 
-    /// Sends bytes down channel `index`; returns how many it had room for.
-    pub fn down(self, machine: &mut Machine, index: u32, bytes: &[u8]) -> Result<usize, CoreError> {
-        let Some(ring) = self.ring(machine, index, true)? else { return Ok(0) };
+    fn check(&mut self, offsets: &mut Offsets, index: u32) -> Result<(), ChannelError<CoreError>> {
+        self.known(offsets, index).map(|_| ())
+    }
+
+    fn write(
+        &mut self,
+        _: &mut Offsets,
+        index: u32,
+        bytes: &[u8],
+    ) -> Result<usize, ChannelError<CoreError>> {
+        let ring = self.ring(index, true)?.ok_or(ChannelError::Stale)?;
         let mut write = ring.write;
         for (sent, byte) in bytes.iter().enumerate() {
             let next = (write + 1) % ring.size;
             if next == ring.read {
                 return Ok(sent);
             }
-            machine.poke(ring.buffer + write, &[*byte])?;
-            machine.poke(ring.at + 12, &next.to_le_bytes())?;
+            self.machine.poke(ring.buffer + write, &[*byte])?;
+            self.machine.poke(ring.at + 12, &next.to_le_bytes())?;
             write = next;
         }
         Ok(bytes.len())

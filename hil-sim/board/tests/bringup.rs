@@ -22,9 +22,12 @@ use crate::common::{Board, elf, strings};
 
 /// The power-up of a board with these mistakes, every motion allowed.
 fn power_up(mistakes: &[Mistake]) -> Progress {
+    let bench = Bench::wired(elf(), strings(), &Scenario::default(), mistakes).expect("a bench");
+    power_up_at(Attended::new(bench), mistakes)
+}
+
+fn power_up_at(mut board: Attended<'_>, mistakes: &[Mistake]) -> Progress {
     let scenario = Scenario::default();
-    let bench = Bench::wired(elf(), strings(), &scenario, mistakes).expect("a bench");
-    let mut board = Attended::new(bench);
     let mut person = board.person(Stdin::new(std::io::empty(), std::io::sink(), true));
     let mut progress = Progress::new(scenario);
     let mut line = Line::new(&mut board);
@@ -34,6 +37,14 @@ fn power_up(mistakes: &[Mistake]) -> Progress {
     ended.unwrap_or_else(|error| panic!("{mistakes:?}: {error}: {said:#?}"));
     assert!(kept > 0);
     progress
+}
+
+#[test]
+fn a_sound_board_passes_every_check_over_a_slow_probe() {
+    let bench = Bench::new(elf(), strings(), &Scenario::default()).expect("a bench");
+    let progress = power_up_at(Attended::new(bench).on_usb(), &[]);
+    let failed: Vec<_> = progress.checks().filter(|check| !check.ok).collect();
+    assert!(failed.is_empty() && progress.is_complete(), "{failed:#?}");
 }
 
 #[test]

@@ -18,6 +18,8 @@ use interstage::fault::Fault;
 use interstage::hal::hil::{FIRST, Given, Taken};
 use interstage::rig::Rig;
 use interstage::supervise::{Command, Mode};
+use rig_board::bench::STEP;
+use rig_board::log::Strings;
 use rig_board::port::EmulatedPort;
 
 use crate::common::scenario;
@@ -77,41 +79,34 @@ fn bridges_have_no_power(port: &mut EmulatedPort) {
     }
 }
 
-/// A port over which every exchange takes this long on the board.
-struct Slow {
-    port: EmulatedPort,
-    milliseconds: u64,
-}
+/// A port that takes what is sent in pieces.
+struct InPieces(EmulatedPort);
 
-impl Port for Slow {
+impl Port for InPieces {
     fn up(&mut self, channel: u32) -> Result<Vec<u8>, PortError> {
-        self.port.up(channel)
+        self.0.up(channel)
     }
 
     fn down(&mut self, channel: u32, bytes: &[u8]) -> Result<usize, PortError> {
-        // In pieces, as a probe may.
-        self.port.down(channel, &bytes[..bytes.len().min(5)])
+        self.0.down(channel, &bytes[..bytes.len().min(5)])
     }
 
     fn reset(&mut self) -> Result<(), PortError> {
-        self.port.reset()
+        self.0.reset()
     }
 
     fn memory(&mut self, address: u32, into: &mut [u8]) -> Result<(), PortError> {
-        self.port.memory(address, into)
+        self.0.memory(address, into)
     }
 
     fn pass(&mut self) -> Result<Duration, PortError> {
-        let machine = self.port.machine_mut();
-        let until = machine.now() + self.milliseconds * 170_000;
-        machine.run_on(until).map_err(|error| PortError::Gone(error.to_string()))?;
-        Ok(Duration::from_millis(self.milliseconds))
+        self.0.pass()
     }
 }
 
 #[test]
 fn a_slow_port_stretches_time_and_changes_nothing() {
-    let (mut slow, mut fast) = (Slow { port: board(), milliseconds: 3 }, board());
+    let (mut slow, mut fast) = (InPieces(board().on_usb()), board());
     let (mut slow_rig, mut fast_rig) = (Rigged::new(5), Rigged::new(5));
     let (mut slow_line, mut fast_line) =
         (HostLine::begin(&mut slow).expect("ready"), HostLine::begin(&mut fast).expect("ready"));
@@ -231,9 +226,9 @@ fn a_host_that_falls_silent_leaves_the_bridges_off() {
     let alone = run.rows.iter().position(|row| row.tick >= FIRST + 3000).expect("it continues");
     let rows = &run.rows[alone..];
     let seen: Vec<_> = rows.iter().filter_map(Controller::telemetry).collect();
-    // It went on alone: after 50 ms a tick a millisecond, of which the last few are not
+    // It went on alone: after 200 ms a tick a millisecond, of which the last few are not
     // in the log yet.
-    assert!((935..=950).contains(&seen.len()), "{} ticks", seen.len());
+    assert!((785..=800).contains(&seen.len()), "{} ticks", seen.len());
     let held = seen.iter().position(|seen| matches!(seen.mode, Mode::FaultHold(_)));
     let held = held.expect("a fault hold");
     let stale = (Rig::prototype().sense.stale_after_s * 1e3) as usize;
@@ -299,4 +294,25 @@ fn an_image_is_known_by_its_hash() {
     let mut port = board();
     assert_eq!(looped.is_on(&mut port), Ok(true));
     assert_eq!(ordinary.is_on(&mut port), Ok(false));
+}
+
+#[test]
+fn without_a_host_the_pins_are_low_a_watchdog_runs_and_the_log_says_that_nothing_moves() {
+    let mut port = board();
+    port.machine_mut().chip_mut().defects.drive_bridge_floats = true;
+    let mut wait = |milliseconds: u64| {
+        let machine = port.machine_mut();
+        machine.run_on(machine.now() + milliseconds * STEP).expect("runs");
+        let now = machine.now();
+        machine.chip_mut().take_motors(now)
+    };
+    wait(1);
+    for motor in wait(300) {
+        assert_eq!((motor.duty, motor.enabled), (0.0, 0.0), "low");
+    }
+    assert!(port.machine().chip().watchdog.is_started());
+    assert_eq!(port.machine().restarts(), []);
+    let strings = Strings::of(elf()).expect("it logs");
+    let lines = strings.reader().read(&port.up(0).expect("runs"));
+    assert!(lines.iter().any(|line| line.text.contains("moves no motor")), "{lines:?}");
 }

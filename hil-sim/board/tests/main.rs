@@ -13,6 +13,7 @@ mod kept;
 mod log;
 mod panics;
 mod params;
+mod probe;
 mod processor;
 mod registers;
 mod resets;

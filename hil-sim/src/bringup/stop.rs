@@ -49,10 +49,18 @@ pub(super) fn run(session: &mut Session<'_, '_>) -> Result<Vec<Check>, BringupEr
     };
     let good = moved == Seen::Nothing;
     checks.push(check("held in reset", good, measured.to_owned(), advice));
-    // The reset has left the fault hold as well.
+    // What was found stays, whatever the probe finds of the board after its reset.
+    if let Err(error) = back(session) {
+        (session.say)(&format!("  after the reset: {error}"));
+    }
+    Ok(checks)
+}
+
+/// Waits until the board is idle. The reset has left the fault hold as well.
+fn back(session: &mut Session<'_, '_>) -> Result<(), BringupError> {
     session.line.idle()?;
     if session.line.mode()? != Some(Mode::Idle) {
         session.line.reset()?;
     }
-    Ok(checks)
+    Ok(())
 }

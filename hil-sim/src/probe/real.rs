@@ -1,15 +1,15 @@
 //! A real probe, by probe-rs.
 
 use std::path::Path;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use probe_rs::flashing::{DownloadOptions, ElfLoader, ElfOptions, download_file_with_options};
 use probe_rs::probe::list::Lister;
 use probe_rs::probe::{DebugProbeInfo, DebugProbeSelector};
-use probe_rs::rtt::{Error as RttError, Rtt, ScanRegion};
+use probe_rs::rtt::{self, Error as RttError, ScanRegion};
 use probe_rs::{Core, MemoryInterface, Permissions, Session};
 
-use super::{Port, PortError};
+use super::{ChannelError, Channels, Port, PortError, Rtt};
 use crate::files::with_causes;
 
 const CHIP: &str = "STM32G474RETx";
@@ -25,9 +25,11 @@ const MARK: usize = 16;
 /// A board at a probe.
 pub struct RealPort {
     session: Session,
-    rtt: Option<Rtt>,
+    channels: Channels<rtt::Rtt>,
     /// Address of the control block; unknown, it is searched for in RAM.
     block: Option<u32>,
+    /// Time that the accesses since the last pause took.
+    spent: Duration,
 }
 
 impl RealPort {
@@ -52,12 +54,12 @@ impl RealPort {
         let session = probe
             .attach(CHIP, Permissions::default())
             .map_err(|error| PortError::Gone(with_causes(&error)))?;
-        Ok(Self { session, rtt: None, block })
+        Ok(Self { session, channels: Channels::default(), block, spent: Duration::ZERO })
     }
 
     /// Puts an image into the board's flash and reads it back. Parameters stored there stay.
     pub fn flash(&mut self, elf: &Path) -> Result<(), PortError> {
-        self.rtt = None;
+        self.channels.forget();
         let mut options = DownloadOptions::default();
         options.verify = true;
         let loader = ElfLoader(ElfOptions::default());
@@ -65,32 +67,84 @@ impl RealPort {
             .map_err(|error| PortError::Board(format!("flashing failed: {}", with_causes(&error))))
     }
 
-    /// Acts on core and channels, which are searched for first; returns `otherwise` if there
-    /// are none yet.
-    fn with<T>(
+    /// Acts on channels and core, and notes how long it takes.
+    fn timed<T>(&mut self, act: impl FnOnce(&mut Channels<rtt::Rtt>, &mut Link<'_>) -> T) -> T {
+        let begun = Instant::now();
+        let mut link = Link { session: &mut self.session, block: self.block };
+        let done = act(&mut self.channels, &mut link);
+        self.spent += begun.elapsed();
+        done
+    }
+}
+
+/// The session, as what finds and uses the channels.
+struct Link<'a> {
+    session: &'a mut Session,
+    block: Option<u32>,
+}
+
+impl Link<'_> {
+    fn core(&mut self) -> Result<Core<'_>, PortError> {
+        self.session.core(0).map_err(gone)
+    }
+}
+
+/// Of the errors of an access these are the board's.
+fn stale(error: RttError) -> ChannelError<PortError> {
+    match error {
+        RttError::ReadPointerChanged
+        | RttError::ControlBlockNotFound
+        | RttError::ControlBlockCorrupted(_) => ChannelError::Stale,
+        error => ChannelError::Failed(gone(error)),
+    }
+}
+
+impl Rtt for Link<'_> {
+    type Handle = rtt::Rtt;
+    type Error = PortError;
+
+    fn attach(&mut self) -> Result<Option<rtt::Rtt>, PortError> {
+        let block = self.block;
+        let mut core = self.core()?;
+        let found = match block {
+            Some(block) => rtt::Rtt::attach_at(&mut core, block.into()),
+            None => rtt::Rtt::attach_region(&mut core, &ScanRegion::Ram),
+        };
+        match found.map_err(stale) {
+            Ok(rtt) => Ok(Some(rtt)),
+            // Not set up yet, or half set up.
+            Err(ChannelError::Stale) => Ok(None),
+            Err(ChannelError::Failed(error)) => Err(error),
+        }
+    }
+
+    fn read(
         &mut self,
-        otherwise: T,
-        act: impl FnOnce(&mut Core<'_>, &mut Rtt) -> Result<T, PortError>,
-    ) -> Result<T, PortError> {
-        let mut core = self.session.core(0).map_err(gone)?;
-        if self.rtt.is_none() {
-            let found = match self.block {
-                Some(block) => Rtt::attach_at(&mut core, block.into()),
-                None => Rtt::attach_region(&mut core, &ScanRegion::Ram),
-            };
-            match found {
-                Ok(rtt) => self.rtt = Some(rtt),
-                // Not set up yet, or half set up.
-                Err(RttError::ControlBlockNotFound | RttError::ControlBlockCorrupted(_)) => {
-                    return Ok(otherwise);
-                }
-                Err(error) => return Err(gone(error)),
-            }
-        }
-        match &mut self.rtt {
-            Some(rtt) => act(&mut core, rtt),
-            None => Ok(otherwise),
-        }
+        rtt: &mut rtt::Rtt,
+        channel: u32,
+    ) -> Result<Vec<u8>, ChannelError<PortError>> {
+        let up = rtt.up_channel(channel as usize).ok_or_else(|| missing(channel))?;
+        let mut bytes = vec![0; up.buffer_size()];
+        let read = up.read(&mut self.core()?, &mut bytes).map_err(stale)?;
+        bytes.truncate(read);
+        Ok(bytes)
+    }
+
+    fn check(&mut self, rtt: &mut rtt::Rtt, channel: u32) -> Result<(), ChannelError<PortError>> {
+        let up = rtt.up_channel(channel as usize).ok_or_else(|| missing(channel))?;
+        // Reads the offsets alone.
+        up.peek(&mut self.core()?, &mut []).map_err(stale)?;
+        Ok(())
+    }
+
+    fn write(
+        &mut self,
+        rtt: &mut rtt::Rtt,
+        channel: u32,
+        bytes: &[u8],
+    ) -> Result<usize, ChannelError<PortError>> {
+        let down = rtt.down_channel(channel as usize).ok_or_else(|| missing(channel))?;
+        down.write(&mut self.core()?, bytes).map_err(stale)
     }
 }
 
@@ -123,33 +177,15 @@ fn missing(channel: u32) -> PortError {
 
 impl Port for RealPort {
     fn up(&mut self, channel: u32) -> Result<Vec<u8>, PortError> {
-        self.with(Vec::new(), |core, rtt| {
-            let up = rtt.up_channel(channel as usize).ok_or_else(|| missing(channel))?;
-            let mut bytes = vec![0; up.buffer_size()];
-            let read = match up.read(core, &mut bytes) {
-                Ok(read) => read,
-                // The firmware has just restarted.
-                Err(RttError::ReadPointerChanged | RttError::ControlBlockCorrupted(_)) => 0,
-                Err(error) => return Err(gone(error)),
-            };
-            bytes.truncate(read);
-            Ok(bytes)
-        })
+        self.timed(|channels, link| channels.up(link, channel))
     }
 
     fn down(&mut self, channel: u32, bytes: &[u8]) -> Result<usize, PortError> {
-        self.with(0, |core, rtt| {
-            let down = rtt.down_channel(channel as usize).ok_or_else(|| missing(channel))?;
-            match down.write(core, bytes) {
-                Ok(sent) => Ok(sent),
-                Err(RttError::ControlBlockCorrupted(_)) => Ok(0),
-                Err(error) => Err(gone(error)),
-            }
-        })
+        self.timed(|channels, link| channels.down(link, channel, bytes))
     }
 
     fn reset(&mut self) -> Result<(), PortError> {
-        self.rtt = None;
+        self.channels.forget();
         let mut core = self.session.core(0).map_err(gone)?;
         core.reset_and_halt(HALT).map_err(gone)?;
         if let Some(block) = self.block {
@@ -160,12 +196,11 @@ impl Port for RealPort {
     }
 
     fn memory(&mut self, address: u32, into: &mut [u8]) -> Result<(), PortError> {
-        let mut core = self.session.core(0).map_err(gone)?;
-        core.read(address.into(), into).map_err(gone)
+        self.timed(|_, link| link.core()?.read(address.into(), into).map_err(gone))
     }
 
     fn pass(&mut self) -> Result<Duration, PortError> {
-        std::thread::sleep(PAUSE);
-        Ok(PAUSE)
+        self.timed(|_, _| std::thread::sleep(PAUSE));
+        Ok(std::mem::take(&mut self.spent))
     }
 }

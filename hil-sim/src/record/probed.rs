@@ -20,12 +20,13 @@ const POLLS: u32 = 20;
 pub struct Probed<'a> {
     port: ReconnectingPort<'a>,
     letters: VecDeque<u8>,
+    news: Vec<String>,
 }
 
 impl<'a> Probed<'a> {
     /// Over this port.
     pub const fn new(port: ReconnectingPort<'a>) -> Self {
-        Self { port, letters: VecDeque::new() }
+        Self { port, letters: VecDeque::new(), news: Vec::new() }
     }
 }
 
@@ -33,10 +34,12 @@ impl Source for Probed<'_> {
     fn read(&mut self) -> Result<Option<Vec<u8>>, SourceError> {
         let mut read = Vec::new();
         for _ in 0..POLLS {
-            if let Some(letter) = self.letters.front()
-                && self.port.down(CONSOLE, &[*letter])? == 1
+            if let Some(letter) = self.letters.pop_front()
+                && self.port.down(CONSOLE, &[letter])? == 0
             {
-                self.letters.pop_front();
+                // Not later: the operator has to see the board as it is then.
+                let key = char::from(letter);
+                self.news.push(format!("`{key}` was not sent: the board has restarted or is gone"));
             }
             read.extend(self.port.up(LOG)?);
             self.port.pass()?;
@@ -50,7 +53,9 @@ impl Source for Probed<'_> {
     }
 
     fn news(&mut self) -> Vec<String> {
-        self.port.take_news()
+        let mut news = self.port.take_news();
+        news.append(&mut self.news);
+        news
     }
 }
 

@@ -1,6 +1,10 @@
 //! The host's line, in thread mode: below every task, so it runs only while all of them wait.
 
+use core::sync::atomic::Ordering;
+
 use cortex_m::peripheral::DWT;
+use embassy_stm32::peripherals::IWDG;
+use embassy_stm32::wdg::IndependentWatchdog;
 use interstage::hal::hil::{FIRST, Given, PROTOCOL, Taken, ToBoard, ToHost};
 use interstage::log::codes;
 use interstage::params::link::{FrameReader, frame};
@@ -9,31 +13,41 @@ use rtt_target::{ChannelMode, DownChannel, UpChannel};
 
 use super::clock;
 use super::host_io::HOST_IO;
+use crate::board::safety::UNFED;
 use crate::board::{EXCHANGE, guard};
 
 /// Cycles of a millisecond.
 const MILLISECOND: u32 = 170_000;
 
-/// Time without a tick after which the host counts as gone: half of the watchdog's time-out.
-const SILENCE: u32 = 50 * MILLISECOND;
+/// Time without a tick after which the host counts as gone: longer than a probe's hub or host is
+/// busy with something else.
+const SILENCE: u32 = 200 * MILLISECOND;
 
 type Channels = (UpChannel, DownChannel);
 
 /// Waits for a host, calls `begin`, which starts the tasks, and serves the host's ticks. Before
-/// a host has come nothing runs, the watchdog included.
+/// a host has come nothing runs but the watchdog, which this feeds: it runs only while every task
+/// waits.
 ///
 /// When the host falls silent, the sensors do. The board continues alone, a tick a millisecond,
 /// so that the controller finds the fault, switches the bridges off and holds, and the ticks
 /// feed the watchdog. Only a restart ends that.
 pub(super) fn serve(channels: Channels, begin: impl FnOnce()) -> ! {
     guard::count_cycles();
+    // SAFETY: what the tasks get at `begin` is set up once more, to the same.
+    let mut dog = IndependentWatchdog::new(unsafe { IWDG::steal() }, guard::TIMEOUT_US);
+    dog.unleash();
     let mut line = HostConnection { channels, reader: FrameReader::new() };
-    while line.take() != Some(ToBoard::Hello { protocol: PROTOCOL }) {}
+    while line.take() != Some(ToBoard::Hello { protocol: PROTOCOL }) {
+        dog.pet();
+    }
     begin();
-    let mut run = Run { next: FIRST, last: None, alone: false };
+    let mut run = Run { next: FIRST, last: None, alone: false, unfed: 0 };
     line.send(&run.next_tick());
     let mut heard = DWT::cycle_count();
     loop {
+        dog.pet();
+        UNFED.store(run.unfed, Ordering::Relaxed);
         if let Some(message) = line.take() {
             if let Some(answer) = run.answer(message) {
                 line.send(&answer);
@@ -56,6 +70,8 @@ struct Run {
     /// The latest tick and what it gave.
     last: Option<(Tick, Taken)>,
     alone: bool,
+    /// [`UNFED`] after it: between ticks time is the host's, and does not count.
+    unfed: u32,
 }
 
 impl Run {
@@ -91,6 +107,7 @@ impl Run {
             clock::settle();
         }
         clock::advance(self.next);
+        self.unfed = UNFED.load(Ordering::Relaxed);
         self.next = self.next.wrapping_add(1);
     }
 }

@@ -31,11 +31,13 @@ pub(super) fn on_probe(
     if !image.is_on(&mut port).map_err(Failure::run)? {
         let _progress = progress::spinner("flashing the firmware for the loop");
         port.flash(&path).map_err(Failure::run)?;
-        eprintln!(
-            "the board now has the firmware for the loop; `cargo rig flash` puts the other back"
-        );
     }
-    close(args, &mut port, scenario, directory, "probe")
+    let ended = close(args, &mut port, scenario, directory, "probe");
+    eprintln!(
+        "the board keeps the firmware for the loop, which moves no motor; `cargo rig flash` puts \
+         the other back"
+    );
+    ended
 }
 
 /// Runs the scenario over this port.
