@@ -74,17 +74,13 @@ impl Watchdog for Guard {
     }
 }
 
-/// Connects a lock-up of the core and a supply that falls to the break of the PWM timers, and
-/// stops the watchdog while a debugger halts the core.
+/// Connects a lock-up of the core to the break of the PWM timers, and stops the watchdog while a
+/// debugger halts the core.
 pub(crate) fn arm() {
     // A locked-up core (a fault inside the fault handler, as after a stack overflow) executes
     // nothing any more: the timers cut the bridges themselves.
-    // A supply below the detector's threshold does the same before its interrupt; this locks
-    // the threshold.
-    SYSCFG.cfgr2().modify(|w| {
-        w.set_cll(true);
-        w.set_pvdl(true);
-    });
+    // A low supply does not: its detector has no filter, and a bounce would end a run.
+    SYSCFG.cfgr2().modify(|w| w.set_cll(true));
     // Halted at a breakpoint, TIM1 and TIM8 stop with their outputs off, and the clock stops.
     DBGMCU.apb1lfzr().modify(|w| {
         w.set_iwdg(true);

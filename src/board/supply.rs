@@ -1,8 +1,9 @@
 //! Supply monitor: before the supply is too low for the chip, it switches the bridges off and
 //! writes the drive's snapshot to flash, where the next start finds it.
 //!
-//! The chip compares its supply with 2.9 V. From there to its own reset at 1.7 V the board's
-//! capacitors last for a millisecond (see `docs/HARDWARE.md`); a record takes a third of that.
+//! The chip compares its supply with 2.81 V, without a filter: what has gone after [`BOUNCE`] was
+//! none. From there to its own reset at 1.7 V the board's capacitors last for a millisecond (see
+//! `docs/HARDWARE.md`); a record takes a third of that.
 
 use embassy_stm32::interrupt::{self, InterruptExt};
 use interstage::restart::Stopped;
@@ -10,10 +11,15 @@ use interstage::restart::flash_log::{self, Latest};
 
 use super::flash_page::RECORDS;
 use super::registers::{EXTI, PWR};
-use super::{retained, safety};
+use super::{SYSCLK_HZ, retained, safety};
 
-/// Threshold of the chip's detector: 2.9 V falling, 3.0 V rising.
-const LEVEL: u8 = 6;
+/// Threshold of the chip's detector: falling 2.75 to 2.86 V, rising 2.85 to 2.96 V (DS12288,
+/// V_PVD5). The next one reaches up to 3.04 V, too near to a supply of 3.17 V under load.
+const LEVEL: u8 = 5;
+
+/// For so many rounds of three or four cycles a supply has to be low: 20 to 27 us, in which it
+/// falls by 10 mV at most.
+const BOUNCE: u32 = SYSCLK_HZ / 50_000 / 3;
 
 /// Line of the detector among the external interrupts; high while the supply is low.
 const LINE: usize = 16;
@@ -26,7 +32,6 @@ pub(crate) fn watch() -> bool {
     });
     EXTI.rtsr(0).modify(|w| w.set_line(LINE, true));
     EXTI.imr(0).modify(|w| w.set_line(LINE, true));
-    let is_low = || PWR.sr2().read().pvdo();
     let mut waited = false;
     // A fall before the detector ran has been waited for; one after the last check raises the
     // interrupt.
@@ -37,9 +42,13 @@ pub(crate) fn watch() -> bool {
     } {
         waited = true;
     }
-    // SAFETY: the handler never returns, so it shares nothing with other code.
+    // SAFETY: the handler shares nothing with other code: it returns having done nothing, or never.
     unsafe { interrupt::PVD_PVM.enable() };
     waited
+}
+
+fn is_low() -> bool {
+    PWR.sr2().read().pvdo()
 }
 
 /// The record of the last loss of supply, if no start has taken it yet.
@@ -57,9 +66,14 @@ pub(super) fn take(found: Option<Latest>) {
     }
 }
 
-/// The supply falls. After this handler only a start follows.
+/// The supply falls: a start follows, unless it was a bounce.
 #[embassy_stm32::interrupt]
 unsafe fn PVD_PVM() {
+    EXTI.pr(0).write(|w| w.set_line(LINE, true));
+    cortex_m::asm::delay(BOUNCE);
+    if !is_low() {
+        return;
+    }
     cortex_m::interrupt::disable();
     safety::cut();
     // Whatever ends the program from here on, this is the reason.
@@ -72,6 +86,6 @@ unsafe fn PVD_PVM() {
         }
     }
     // The supply may recover before a reset, or the watchdog may bite first.
-    while PWR.sr2().read().pvdo() {}
+    while is_low() {}
     safety::restart()
 }
