@@ -51,6 +51,9 @@ pub struct Defects {
     /// Codes, in parts of 2^16, that the inputs of preload sensor, compression sensor, drive's
     /// and pre-tightener's bridge read instead of their voltages.
     pub stuck_codes: [Option<u16>; 4],
+    /// The noise at the analogue inputs is below half a step of 12 bits: each conversion of a mean
+    /// gives the same.
+    pub quiet_inputs: bool,
     /// DMA moves nothing.
     pub dma_stalled: bool,
     /// Writes that clear the flags of the time driver's timer have no effect.

@@ -6,6 +6,7 @@ use rig_board::bench::{Bench, STEP};
 use rig_board::chip::{Pin, description};
 use rig_board::core::{Access, Bus, Register};
 use rig_board::faults::Fault;
+use rig_board::machine::Machine;
 use rig_board::peripherals::flash::Wrong;
 use rig_board::peripherals::iwdg::LSI_RANGE_HZ;
 use rig_board::peripherals::pwr::Then;
@@ -209,6 +210,42 @@ fn a_damaged_flash_cuts_the_bridges_without_the_software() {
     Fault::WrongBits(hang.pc(), Wrong::Two).strike(hang).expect("strikes");
     board.step();
     assert_eq!(board.step().drives.drive, 0.0);
+}
+
+/// Codes of 16 bits are means of 12: they have their resolution from the noise at the pins alone.
+#[test]
+fn inputs_without_noise_give_codes_of_12_bits_and_no_fault() {
+    // A third of a step of 12 bits, and none.
+    for noise in [
+        ["noise.preload_sensor_n=0.02", "noise.compression_sensor_mm=0.0005"],
+        ["noise.preload_sensor_n=0", "noise.compression_sensor_mm=0"],
+    ] {
+        let mut board = Board::off(&noise);
+        board.machine().chip_mut().defects.quiet_inputs = true;
+        board.until("mode: idle", 3000);
+        // At rest for longer than what counts as stuck.
+        board.run(1000);
+        board.send(b's');
+        board.until("mode: deployed", 20_000);
+        assert!(!board.said("] fault "), "{:#?}", board.log);
+    }
+}
+
+/// Until the PLL is selected the core runs at 16 MHz; its cycles are counted as those of the full
+/// clock here, so that the first tick comes later on a board than in the emulation.
+#[test]
+fn the_start_at_the_slow_clock_takes_a_fiftieth_of_a_second() {
+    let mut board = Board::off(&[]);
+    let machine = board.machine();
+    let clock_in_use = |machine: &mut Machine| {
+        let now = machine.now();
+        machine.chip_mut().rcc.read(CLOCK_IN_USE, now).expect("a register") >> 2 & 3
+    };
+    while clock_in_use(machine) == 1 {
+        machine.run_on(machine.now() + 1000).expect("runs");
+    }
+    let slow_ms = machine.now() as f64 / 16e3;
+    assert!((15.0..30.0).contains(&slow_ms), "{slow_ms} ms");
 }
 
 /// The detector has no filter; what is over after some microseconds was no fall.
