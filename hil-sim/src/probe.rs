@@ -8,7 +8,7 @@ mod reconnecting;
 
 use std::time::Duration;
 
-pub use channels::{ChannelError, Channels, Rtt};
+pub use channels::{Access, ChannelError, Channels, Rtt};
 #[cfg(feature = "probe")]
 pub use real::RealPort;
 pub use reconnecting::ReconnectingPort;

@@ -2,7 +2,7 @@
 
 use core::{ptr, slice};
 
-use cortex_m::peripheral::{SYST, syst};
+use cortex_m::asm;
 use interstage::restart::image_checksum;
 
 use super::flash_page::IMAGE_CHECKSUMS;
@@ -39,58 +39,23 @@ pub(super) fn words() -> &'static [u32] {
     unsafe { slice::from_raw_parts(ptr::with_exposed_provenance(first as usize), length / 4) }
 }
 
-/// Half a period of 2 Hz, cycles of the oscillator that the chip starts on.
-const HALF_PERIOD: u32 = 16_000_000 / 4;
+/// Half a period of 2 to 3 Hz, rounds of three or four cycles of the oscillator that the chip
+/// starts on.
+const HALF_PERIOD: u32 = 16_000_000 / 4 / 4;
 
 /// Runs first of all, before statics have their values: shows a damaged image by the light, in
 /// case the code that would log it no longer works. The light is off for half a period, the
 /// checksum included, and then on: a damaged image that restarts in a loop blinks. Needs only
-/// this function, [`checksums`] and some registers: it may read and write no static in RAM.
-///
-/// Before all that it drives the bridges' lines low: in reset they have their pull-downs alone.
+/// this function, [`checksums`] and some registers: it may read and write no static in RAM. The
+/// bridges' lines, which in reset have their pull-downs alone, it drives low before all else.
 #[unsafe(export_name = "__pre_init")]
 extern "C" fn look() {
     light::hold_bridges();
-    let clock = Clock::start();
     let (now, first) = checksums();
     if first.is_some_and(|first| first != now) {
-        clock.wait_until(HALF_PERIOD);
+        asm::delay(HALF_PERIOD);
         light::glow();
-        clock.wait_until(2 * HALF_PERIOD);
-    }
-    clock.stop();
-}
-
-/// The system timer before anything else uses it. A counted loop takes two to four cycles a
-/// round on this core, depending on where it lies.
-struct Clock(&'static syst::RegisterBlock);
-
-impl Clock {
-    /// The greatest count of 24 bits.
-    const MOST: u32 = 0x00FF_FFFF;
-    /// On, by the core's clock, without an interrupt.
-    const ON: u32 = 1 << 2 | 1;
-
-    fn start() -> Self {
-        // SAFETY: the timer's registers, at their place in every core; nothing else runs yet.
-        let registers = unsafe { &*SYST::PTR };
-        // SAFETY: these values start the timer and nothing else.
-        unsafe {
-            registers.rvr.write(Self::MOST);
-            registers.cvr.write(0);
-            registers.csr.write(Self::ON);
-        }
-        Self(registers)
-    }
-
-    /// Waits until so many cycles after the start, one second at most.
-    fn wait_until(&self, cycles: u32) {
-        while Self::MOST - self.0.cvr.read() < cycles {}
-    }
-
-    fn stop(self) {
-        // SAFETY: switches the timer off.
-        unsafe { self.0.csr.write(0) }
+        asm::delay(HALF_PERIOD);
     }
 }
 

@@ -31,54 +31,45 @@ pub(crate) struct Channels {
     pub(crate) line: (UpChannel, DownChannel),
 }
 
-/// Sets up the channels and the log. Call once, first of all.
+/// Sets up the channels and the log, with these more channels, which are given back as well.
 ///
 /// The binary log's buffer has a section of its own for word alignment: frames are copied by
 /// words, at a third of the cost.
+macro_rules! init {
+    ([$($up:tt)*], [$($down:tt)*], $all:ident => $more:expr) => {{
+        let $all = rtt_init! {
+            up: {
+                0: { size: 2048, mode: ChannelMode::NoBlockSkip, name: "defmt" }
+                1: { size: 4096, mode: ChannelMode::NoBlockSkip, name: "telemetry", section: ".uninit.telemetry" }
+                2: { size: 128, mode: ChannelMode::NoBlockSkip, name: "line" }
+                $($up)*
+            }
+            down: {
+                0: { size: 16, name: "console" }
+                1: { size: 128, name: "line" }
+                $($down)*
+            }
+        };
+        log_to($all.up.0);
+        let (telemetry, line) = (Frames($all.up.1), ($all.up.2, $all.down.1));
+        (Channels { telemetry, console: $all.down.0, line }, $more)
+    }};
+}
+
+/// Sets up the channels and the log. Call once, first of all.
 #[cfg(not(feature = "hil"))]
 pub(crate) fn init() -> Channels {
-    let channels = rtt_init! {
-        up: {
-            0: { size: 2048, mode: ChannelMode::NoBlockSkip, name: "defmt" }
-            1: { size: 4096, mode: ChannelMode::NoBlockSkip, name: "telemetry", section: ".uninit.telemetry" }
-            2: { size: 128, mode: ChannelMode::NoBlockSkip, name: "line" }
-        }
-        down: {
-            0: { size: 16, name: "console" }
-            1: { size: 128, name: "line" }
-        }
-    };
-    log_to(channels.up.0);
-    Channels {
-        telemetry: Frames(channels.up.1),
-        console: channels.down.0,
-        line: (channels.up.2, channels.down.1),
-    }
+    init!([], [], all => ()).0
 }
 
 /// The same with up 3 and down 2 for the closed loop with the host.
 #[cfg(feature = "hil")]
 pub(crate) fn init() -> (Channels, (UpChannel, DownChannel)) {
-    let channels = rtt_init! {
-        up: {
-            0: { size: 2048, mode: ChannelMode::NoBlockSkip, name: "defmt" }
-            1: { size: 4096, mode: ChannelMode::NoBlockSkip, name: "telemetry", section: ".uninit.telemetry" }
-            2: { size: 128, mode: ChannelMode::NoBlockSkip, name: "line" }
-            3: { size: 64, mode: ChannelMode::NoBlockSkip, name: "hil" }
-        }
-        down: {
-            0: { size: 16, name: "console" }
-            1: { size: 128, name: "line" }
-            2: { size: 64, name: "hil" }
-        }
-    };
-    log_to(channels.up.0);
-    let rest = Channels {
-        telemetry: Frames(channels.up.1),
-        console: channels.down.0,
-        line: (channels.up.2, channels.down.1),
-    };
-    (rest, (channels.up.3, channels.down.2))
+    init!(
+        [3: { size: 64, mode: ChannelMode::NoBlockSkip, name: "hil" }],
+        [2: { size: 64, name: "hil" }],
+        all => (all.up.3, all.down.2)
+    )
 }
 
 fn log_to(channel: UpChannel) {

@@ -13,8 +13,8 @@ use super::flash_page::RECORDS;
 use super::registers::{EXTI, PWR};
 use super::{SYSCLK_HZ, retained, safety};
 
-/// Threshold of the chip's detector: falling 2.75 to 2.86 V, rising 2.85 to 2.96 V (DS12288,
-/// V_PVD5). The next one reaches up to 3.04 V, too near to a supply of 3.17 V under load.
+/// Threshold of the chip's detector: falling 2.75 to 2.86 V, rising up to 2.96 V (DS12288,
+/// V_PVD5). The next one reaches up to 3.04 V, and a supply under load may be down to 3.17 V.
 const LEVEL: u8 = 5;
 
 /// For so many rounds of three or four cycles a supply has to be low: 20 to 27 us, in which it

@@ -180,16 +180,7 @@ impl<'a> Bench<'a> {
     pub fn close(&mut self) -> Result<(Passed, Vec<Line>), BoardError> {
         self.millisecond += 1;
         self.end = self.end() + STEP;
-        let now = self.machine.now();
-        let [drive, preload] = self.machine.chip_mut().take_motors(now);
-        let on = |motor: Motor| motor.enabled > 0.5;
-        let drives = Drives {
-            drive: drive.duty,
-            drive_on: on(drive),
-            preload: preload.duty,
-            preload_on: on(preload),
-            ..Drives::default()
-        };
+        let drives = self.drives();
         let passed = Passed { codes: self.codes, drives };
         let taken = match &mut self.injector {
             Some(injector) => injector.faults.drives(drives),
@@ -217,6 +208,20 @@ impl<'a> Bench<'a> {
             self.starts = !self.send(self.start)?;
         }
         Ok((passed, lines))
+    }
+
+    /// Mean commands at the bridges since the last call.
+    fn drives(&mut self) -> Drives {
+        let now = self.machine.now();
+        let [drive, preload] = self.machine.chip_mut().take_motors(now);
+        let on = |motor: Motor| motor.enabled > 0.5;
+        Drives {
+            drive: drive.duty,
+            drive_on: on(drive),
+            preload: preload.duty,
+            preload_on: on(preload),
+            ..Drives::default()
+        }
     }
 
     /// Sends the command to start as soon as the drive is idle.
@@ -252,17 +257,7 @@ impl<'a> Bench<'a> {
             let end = self.machine.now() + STEP - 1;
             self.machine.halt(STEP - 1);
             self.machine.run_on(end)?;
-            let [drive, preload] = {
-                let now = self.machine.now();
-                self.machine.chip_mut().take_motors(now)
-            };
-            let drives = Drives {
-                drive: drive.duty,
-                drive_on: drive.enabled > 0.5,
-                preload: preload.duty,
-                preload_on: preload.enabled > 0.5,
-                ..Drives::default()
-            };
+            let drives = self.drives();
             self.plant.step(&self.wiring.drives(drives), STEP_S)?;
         }
         self.machine.restart(Cause::Pin)?;

@@ -9,7 +9,6 @@ mod stray;
 
 use super::peripherals::Peripheral;
 use super::peripherals::adc::{self, Adc};
-use super::peripherals::crc::CrcUnit;
 use super::peripherals::dma::{CHANNELS, Dma, Dmamux, Move};
 use super::peripherals::encoder::Encoder;
 use super::peripherals::exti::Exti;
@@ -36,8 +35,8 @@ const SUPPLY_LINE: u32 = 16;
 /// `DBGMCU_IDCODE`: category 3, revision X.
 const DEBUG_IDENTITY: Kept = Kept { offset: 0, reset: 0x2003_6469, mask: 0 };
 
-/// Requests of the multiplexer: ADC1, ADC2, SPI1 in and out.
-const REQUESTS: [u32; 4] = [5, 36, 10, 11];
+/// Requests of the multiplexer: ADC1 and ADC2.
+const REQUESTS: [u32; 2] = [5, 36];
 
 /// Faults of the hardware that a test or a campaign can switch on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -93,7 +92,6 @@ pub struct Chip {
     pub watchdog: Iwdg,
     /// Debug support: its freeze bits act while a debugger halts the core.
     debug: Registers,
-    crc: CrcUnit,
     pub angle: AngleSensor,
     /// The select line was high during the current frame.
     deselected: bool,
@@ -137,7 +135,6 @@ impl Chip {
             spi: Spi::default(),
             watchdog: Iwdg::default(),
             debug: Registers::new(&[DEBUG_IDENTITY], &[0x04, 0x08, 0x0C, 0x10], &[]),
-            crc: CrcUnit::default(),
             angle: AngleSensor::default(),
             deselected: false,
             wheel: 0,
@@ -237,10 +234,6 @@ impl Chip {
 
     pub fn lock_up(&mut self, now: u64) {
         self.locked_up = true;
-        self.break_motors(now);
-    }
-
-    fn break_motors(&mut self, now: u64) {
         self.settle_pins(now);
         self.advance(now);
         self.settle(now);
@@ -280,7 +273,6 @@ impl Chip {
     /// Whether the chip itself breaks the motors' timers. Source: RM0440, `SYSCFG_CFGR2`.
     pub(super) fn system_breaks(&self) -> bool {
         self.locked_up && self.syscfg.lockup_breaks()
-            || self.power.signals_low() && self.syscfg.supply_breaks()
             || self.flash.has_two_wrong_bits() && self.syscfg.flash_breaks()
     }
 
@@ -289,12 +281,7 @@ impl Chip {
         if self.defects.dma_stalled {
             return None;
         }
-        let requested = [
-            self.adc.wants_dma(0),
-            self.adc.wants_dma(1),
-            self.spi.has_word(),
-            self.spi.wants_word(),
-        ];
+        let requested = [0, 1].map(|converter| self.adc.wants_dma(converter));
         if requested == [false; REQUESTS.len()] {
             return None;
         }
@@ -412,7 +399,6 @@ impl Chip {
             Block::Counter => &mut self.counter,
             Block::System => &mut self.system,
             Block::Debug => &mut self.debug,
-            Block::Crc => &mut self.crc,
         }
     }
 }

@@ -376,15 +376,7 @@ impl Machine {
         let (memory, bytes) = due.memory;
         let (address, size) = due.peripheral;
         let access = Access { address, size, pc: 0, now };
-        let mut word = [0; 4];
-        if due.from_memory {
-            let found = self.core.read(memory, &mut word[..bytes as usize]).is_ok();
-            if found {
-                self.chip_mut().write(access, u32::from_le_bytes(word));
-            }
-            return Ok(found);
-        }
-        word = self.chip_mut().read(access).to_le_bytes();
+        let word = self.chip_mut().read(access).to_le_bytes();
         Ok(self.core.write(memory, &word[..bytes as usize]).is_ok())
     }
 

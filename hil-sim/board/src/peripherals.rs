@@ -13,7 +13,6 @@
 //! description; in a run `unmodelled` must stay empty.
 
 pub mod adc;
-pub mod crc;
 pub mod dma;
 pub mod encoder;
 pub mod exti;

@@ -4,7 +4,7 @@
 //! Source: SEGGER, RTT implementation (wiki, "Real Time Transfer"), layout of the
 //! control block; what makes a handle stale: probe-rs 0.32, `rtt/channel.rs`.
 
-use hil_sim::probe::{ChannelError, Channels, Rtt};
+use hil_sim::probe::{Access, ChannelError, Channels, Rtt};
 
 use super::core::CoreError;
 use super::error::ImageError;
@@ -91,7 +91,7 @@ impl Link<'_> {
     }
 
     /// The ring of a channel up, if its read offset is as it was left.
-    fn known(&self, offsets: &Offsets, index: u32) -> Result<Ring, ChannelError<CoreError>> {
+    fn known(&self, offsets: &Offsets, index: u32) -> Access<Ring, CoreError> {
         let ring = self.ring(index, false)?.ok_or(ChannelError::Stale)?;
         match offsets[index as usize] {
             Some(read) if read != ring.read => Err(ChannelError::Stale),
@@ -108,11 +108,7 @@ impl Rtt for Link<'_> {
         Ok(self.ring(0, false)?.map(|_| Offsets::default()))
     }
 
-    fn read(
-        &mut self,
-        offsets: &mut Offsets,
-        index: u32,
-    ) -> Result<Vec<u8>, ChannelError<CoreError>> {
+    fn read(&mut self, offsets: &mut Offsets, index: u32) -> Access<Vec<u8>, CoreError> {
         let ring = self.known(offsets, index)?;
         let mut taken = Vec::new();
         let mut read = ring.read;
@@ -130,16 +126,16 @@ impl Rtt for Link<'_> {
         Ok(taken)
     }
 
-    fn check(&mut self, offsets: &mut Offsets, index: u32) -> Result<(), ChannelError<CoreError>> {
-        self.known(offsets, index).map(|_| ())
-    }
-
     fn write(
         &mut self,
-        _: &mut Offsets,
+        offsets: &mut Offsets,
+        heard: Option<u32>,
         index: u32,
         bytes: &[u8],
-    ) -> Result<usize, ChannelError<CoreError>> {
+    ) -> Access<usize, CoreError> {
+        if let Some(heard) = heard {
+            self.known(offsets, heard)?;
+        }
         let ring = self.ring(index, true)?.ok_or(ChannelError::Stale)?;
         let mut write = ring.write;
         for (sent, byte) in bytes.iter().enumerate() {

@@ -125,38 +125,6 @@ impl Program {
     }
 }
 
-/// Each level of the lock, a field that it protects, and one that it leaves.
-#[test]
-fn timer_lock_keeps_what_its_level_protects() {
-    for (level, register, locked, free) in [
-        (1, "TIM1.BDTR", "BKE", "OSSR"),
-        (2, "TIM1.BDTR", "OSSR", "MOE"),
-        (2, "TIM1.CCER", "CC1P", "CC1E"),
-        (3, "TIM1.CCMR1_OUTPUT", "OC1M", "CC1S"),
-        (1, "TIM1.AF1", "BKINP", ""),
-    ] {
-        let mut program = Program::new();
-        program.set("TIM1.BDTR", &[("LOCK", level)]);
-        if !free.is_empty() {
-            program.set(register, &[(free, 1)]);
-            assert!(program.is_set(register, free), "{level} {register} {free}");
-        }
-        assert_eq!(program.broken(), [], "{level} {register} {free}");
-        program.set(register, &[(locked, 1)]);
-        assert!(!program.is_set(register, locked), "{level} {register} {locked}");
-        program.assert_broken(Rule::TimerLock);
-    }
-}
-
-#[test]
-fn timer_lock_is_settled_by_the_first_write() {
-    let mut program = Program::new();
-    program.set("TIM1.BDTR", &[("BKE", 1)]);
-    program.set("TIM1.BDTR", &[("LOCK", 1)]);
-    assert_eq!(program.read("TIM1.BDTR") & field("TIM1.BDTR", "LOCK", 3), 0);
-    program.assert_broken(Rule::TimerLockOnce);
-}
-
 /// PB12, the first timer's break, is open after power-up in a world that pulls it low.
 #[test]
 fn a_break_clears_moe_after_its_filter_and_keeps_it_cleared() {
@@ -269,47 +237,12 @@ fn dma_channel_is_set_up_only_while_it_is_disabled() {
 }
 
 #[test]
-fn locked_pin_keeps_its_configuration() {
-    let mut program = Program::new();
-    let (key, pin) = (field("GPIOB.LCKR", "LCKK", 1), field("GPIOB.LCKR", "LCK12", 1));
-    // Another order locks nothing.
-    for word in [key | pin, pin, pin] {
-        program.write("GPIOB.LCKR", word);
-    }
-    assert_eq!(program.read("GPIOB.LCKR"), 0);
-    for word in [key | pin, pin, key | pin] {
-        program.write("GPIOB.LCKR", word);
-    }
-    assert_eq!(program.read("GPIOB.LCKR"), key | pin);
-    program.set("GPIOB.MODER", &[("MODER11", 1)]);
-    program.set("GPIOB.AFRH", &[("AFRH13", 5)]);
-    assert_eq!(program.broken(), []);
-    for (register, name) in [("GPIOB.MODER", "MODER12"), ("GPIOB.AFRH", "AFRH12")] {
-        let old = program.read(register);
-        program.set(register, &[(name, 1)]);
-        assert_eq!(program.read(register), old);
-    }
-    assert_eq!(program.broken(), [Rule::PinLock; 2]);
-}
-
-#[test]
-fn locked_voltage_detector_keeps_its_settings() {
-    let mut program = Program::new();
-    program.set("PWR.CR2", &[("PVDE", 1), ("PVDLS", 6)]);
-    program.set("SYSCFG.CFGR2", &[("PVDL", 1)]);
-    let old = program.read("PWR.CR2");
-    program.set("PWR.CR2", &[("PVDE", 0)]);
-    assert_eq!(program.read("PWR.CR2"), old);
-    program.assert_broken(Rule::DetectorLock);
-}
-
-#[test]
 fn a_one_in_a_reserved_bit_is_reported_by_name() {
     let mut program = Program::new();
-    program.write("GPIOB.LCKR", 1 << 20);
+    program.write("GPIOB.BRR", 1 << 20);
     let report: Vec<_> = program.chip.strays().iter().map(ToString::to_string).collect();
     assert_eq!(report.len(), 1);
-    assert!(report[0].contains("write to GPIOB LCKR 0x01c: reserved bits 0x100000"), "{report:?}");
+    assert!(report[0].contains("write to GPIOB BRR 0x028: reserved bits 0x100000"), "{report:?}");
 }
 
 /// Each request arrives at the interrupt that the description has for it, and at no other.

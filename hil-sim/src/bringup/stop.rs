@@ -42,7 +42,7 @@ pub(super) fn run(session: &mut Session<'_, '_>) -> Result<Vec<Check>, BringupEr
         Seen::Nothing => ("nothing moved", ""),
         Seen::Yes => (
             "something moved",
-            "a pull-down of 10 kOhm at a bridge's PWM or enable line is missing (PA8, PA10, PC6, \
+            "a pull-down of 4.7 kOhm at a bridge's PWM or enable line is missing (PA8, PA10, PC6, \
              PC9): the one whose motor moved",
         ),
         _ => ("not observed", NOBODY_LOOKED),

@@ -12,6 +12,9 @@ pub enum ChannelError<E> {
     Failed(E),
 }
 
+/// The result of an access.
+pub type Access<T, E> = Result<T, ChannelError<E>>;
+
 impl<E> From<E> for ChannelError<E> {
     fn from(error: E) -> Self {
         Self::Failed(error)
@@ -28,26 +31,17 @@ pub trait Rtt {
     fn attach(&mut self) -> Result<Option<Self::Handle>, Self::Error>;
 
     /// Takes the bytes that a channel has sent up.
-    fn read(
-        &mut self,
-        handle: &mut Self::Handle,
-        channel: u32,
-    ) -> Result<Vec<u8>, ChannelError<Self::Error>>;
+    fn read(&mut self, handle: &mut Self::Handle, channel: u32) -> Access<Vec<u8>, Self::Error>;
 
-    /// Fails if the read offset of this channel up is another one than after the last read.
-    fn check(
-        &mut self,
-        handle: &mut Self::Handle,
-        channel: u32,
-    ) -> Result<(), ChannelError<Self::Error>>;
-
-    /// Sends bytes down a channel, as many as there is room for; returns how many.
+    /// Sends bytes down a channel, as many as there is room for; returns how many. Fails if the
+    /// read offset of the channel `heard` is another one than after its last read.
     fn write(
         &mut self,
         handle: &mut Self::Handle,
+        heard: Option<u32>,
         channel: u32,
         bytes: &[u8],
-    ) -> Result<usize, ChannelError<Self::Error>>;
+    ) -> Access<usize, Self::Error>;
 }
 
 /// The channels of a board that may restart: a stale handle is dropped, and the next access finds
@@ -72,11 +66,10 @@ impl<H> Channels<H> {
     }
 
     /// Takes the bytes that a channel has sent up; none while there is no channel.
-    pub fn up<R: Rtt<Handle = H>>(
-        &mut self,
-        rtt: &mut R,
-        channel: u32,
-    ) -> Result<Vec<u8>, R::Error> {
+    pub fn up<R>(&mut self, rtt: &mut R, channel: u32) -> Result<Vec<u8>, R::Error>
+    where
+        R: Rtt<Handle = H>,
+    {
         let bytes = self.with(rtt, |rtt, handle| rtt.read(handle, channel))?.unwrap_or_default();
         if !bytes.is_empty() {
             self.heard = Some(channel);
@@ -95,11 +88,7 @@ impl<H> Channels<H> {
         let heard = self.heard;
         let sent = self.with(rtt, |rtt, handle| match heard {
             None if channel == CONSOLE => Ok(0),
-            None => rtt.write(handle, channel, bytes),
-            Some(heard) => {
-                rtt.check(handle, heard)?;
-                rtt.write(handle, channel, bytes)
-            }
+            heard => rtt.write(handle, heard, channel, bytes),
         });
         Ok(sent?.unwrap_or(0))
     }
@@ -108,7 +97,7 @@ impl<H> Channels<H> {
     fn with<T, R: Rtt<Handle = H>>(
         &mut self,
         rtt: &mut R,
-        act: impl FnOnce(&mut R, &mut H) -> Result<T, ChannelError<R::Error>>,
+        act: impl FnOnce(&mut R, &mut H) -> Access<T, R::Error>,
     ) -> Result<Option<T>, R::Error> {
         if self.handle.is_none() {
             self.handle = rtt.attach()?;

@@ -9,7 +9,7 @@ use probe_rs::probe::{DebugProbeInfo, DebugProbeSelector};
 use probe_rs::rtt::{self, Error as RttError, ScanRegion};
 use probe_rs::{Core, MemoryInterface, Permissions, Session};
 
-use super::{ChannelError, Channels, Port, PortError, Rtt};
+use super::{Access, ChannelError, Channels, Port, PortError, Rtt};
 use crate::files::with_causes;
 
 const CHIP: &str = "STM32G474RETx";
@@ -118,11 +118,7 @@ impl Rtt for Link<'_> {
         }
     }
 
-    fn read(
-        &mut self,
-        rtt: &mut rtt::Rtt,
-        channel: u32,
-    ) -> Result<Vec<u8>, ChannelError<PortError>> {
+    fn read(&mut self, rtt: &mut rtt::Rtt, channel: u32) -> Access<Vec<u8>, PortError> {
         let up = rtt.up_channel(channel as usize).ok_or_else(|| missing(channel))?;
         let mut bytes = vec![0; up.buffer_size()];
         let read = up.read(&mut self.core()?, &mut bytes).map_err(stale)?;
@@ -130,21 +126,20 @@ impl Rtt for Link<'_> {
         Ok(bytes)
     }
 
-    fn check(&mut self, rtt: &mut rtt::Rtt, channel: u32) -> Result<(), ChannelError<PortError>> {
-        let up = rtt.up_channel(channel as usize).ok_or_else(|| missing(channel))?;
-        // Reads the offsets alone.
-        up.peek(&mut self.core()?, &mut []).map_err(stale)?;
-        Ok(())
-    }
-
     fn write(
         &mut self,
         rtt: &mut rtt::Rtt,
+        heard: Option<u32>,
         channel: u32,
         bytes: &[u8],
-    ) -> Result<usize, ChannelError<PortError>> {
+    ) -> Access<usize, PortError> {
+        let mut core = self.core()?;
+        if let Some(up) = heard.and_then(|heard| rtt.up_channel(heard as usize)) {
+            // Reads the offsets alone.
+            up.peek(&mut core, &mut []).map_err(stale)?;
+        }
         let down = rtt.down_channel(channel as usize).ok_or_else(|| missing(channel))?;
-        down.write(&mut self.core()?, bytes).map_err(stale)
+        down.write(&mut core, bytes).map_err(stale)
     }
 }
 

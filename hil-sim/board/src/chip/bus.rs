@@ -45,10 +45,6 @@ impl Chip {
                 let boosts = self.power.read(pwr::CR5, now)? & pwr::R1MODE == 0;
                 self.rcc.broken_rule(write, wait_states, boosts, now)
             }
-            (Block::Pwr, pwr::CR2) if self.syscfg.locks_detector() => {
-                let old = self.power.read(offset, now)?;
-                ((write.onto(old) ^ old) & 0xF != 0).then_some(Rule::DetectorLock)
-            }
             _ => None,
         }
     }

@@ -28,7 +28,6 @@ pub(super) enum Block {
     Counter,
     System,
     Debug,
-    Crc,
 }
 
 /// Address ranges of the buses. An access outside is a bus fault, as on the chip.
@@ -54,7 +53,7 @@ const ON: Clock = (0, 0);
 
 /// First address, bytes, block, name in the reference manual, clock. Source: RM0440, table 3
 /// and chapter 7.
-const BLOCKS: [(u32, u32, Block, &str, Clock); 20] = [
+const BLOCKS: [(u32, u32, Block, &str, Clock); 19] = [
     (0x4000_0000, 0x400, Block::Time, "TIM2", (APB1, 0)),
     (0x4000_0C00, 0x400, Block::Encoder, "TIM5", (APB1, 3)),
     (0x4000_1400, 0x400, Block::Basic, "TIM7", (APB1, 5)),
@@ -69,7 +68,6 @@ const BLOCKS: [(u32, u32, Block, &str, Clock); 20] = [
     (0x4002_0800, 0x400, Block::Mux, "DMAMUX", (AHB1, 2)),
     (0x4002_1000, 0x400, Block::Rcc, "RCC", ON),
     (0x4002_2000, 0x400, Block::Flash, "FLASH", ON),
-    (0x4002_3000, 0x400, Block::Crc, "CRC", (AHB1, 12)),
     (0x5000_0000, 0x400, Block::Adc, "ADC12", (AHB2, 13)),
     (0x5000_0400, 0x400, Block::Readback, "ADC345", (AHB2, 14)),
     (0xE000_1000, 0x1000, Block::Counter, "DWT", ON),

@@ -1,6 +1,6 @@
 //! DMA1 with its request multiplexer.
 //!
-//! Transfers between a peripheral and memory, one for each request: channels with their
+//! Transfers from a peripheral to memory, one for each request: channels with their
 //! counters and flags. The chip connects the requests and moves the data.
 //!
 //! Source: RM0440, chapters of DMA and DMAMUX.
@@ -39,12 +39,10 @@ struct Channel {
     flags: u32,
 }
 
-/// A transfer that is due.
+/// A transfer that is due, from a peripheral to memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Move {
     pub channel: usize,
-    /// From memory to the peripheral, else from the peripheral to memory.
-    pub from_memory: bool,
     /// Address in memory and bytes there.
     pub memory: (u32, u32),
     /// Address of the peripheral's register and bytes there.
@@ -62,7 +60,7 @@ impl Dma {
     /// The transfer that channel `index` makes at a request.
     pub fn due(&self, index: usize) -> Option<Move> {
         let c = self.channels.get(index)?;
-        if c.config & ENABLE == 0 || c.left == 0 || c.config & MEMORY_TO_MEMORY != 0 {
+        if c.config & ENABLE == 0 || c.left == 0 {
             return None;
         }
         let bytes = |shift: u32| 1 << (c.config >> shift & 3).min(2);
@@ -72,7 +70,6 @@ impl Dma {
         };
         Some(Move {
             channel: index,
-            from_memory: c.config & FROM_MEMORY != 0,
             memory: (at(c.memory, memory, STEP_MEMORY), memory),
             peripheral: (at(c.peripheral, peripheral, STEP_PERIPHERAL), peripheral),
         })
@@ -148,7 +145,7 @@ impl Peripheral for Dma {
         match register {
             0x0 => {
                 let next = write.onto(c.config) & 0x7FFF;
-                if next & MEMORY_TO_MEMORY != 0 {
+                if next & (MEMORY_TO_MEMORY | FROM_MEMORY) != 0 {
                     return None;
                 }
                 if enabled && next & ENABLE != 0 && next != c.config {
@@ -241,7 +238,7 @@ mod tests {
         let mut dma = ready();
         let first = dma.due(2).expect("due");
         assert_eq!(first.memory, (0x2000_0100, 2));
-        assert_eq!((first.peripheral, first.from_memory), ((0x4001_300C, 2), false));
+        assert_eq!(first.peripheral, (0x4001_300C, 2));
         dma.moved(2, true);
         assert!(!dma.requests(2));
         assert_eq!(dma.due(2).expect("due").memory, (0x2000_0102, 2));

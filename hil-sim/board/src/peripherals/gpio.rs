@@ -1,25 +1,19 @@
 //! A port of sixteen pins.
 //!
-//! Source: RM0440, 9.3 (functions; 9.3.8 is the lock) and 9.4 (registers).
+//! Source: RM0440, 9.3 (functions) and 9.4 (registers).
 
 use super::registers::{Kept, Registers};
 use super::{Peripheral, Write};
-use crate::rules::Rule;
 
 const MODER: u32 = 0x00;
 const PUPDR: u32 = 0x0C;
 const IDR: u32 = 0x10;
 const ODR: u32 = 0x14;
 const BSRR: u32 = 0x18;
-const LCKR: u32 = 0x1C;
 const AFRL: u32 = 0x20;
 const BRR: u32 = 0x28;
 
 const ALL: u32 = u32::MAX;
-
-/// Of the lock: the key, and the values in which it is written to lock the pins.
-const KEY: u32 = 1 << 16;
-const SEQUENCE: [u32; 3] = [KEY, 0, KEY];
 
 /// Everything but input, set and reset; the values after reset are those of ports C to G.
 const REGISTERS: [Kept; 3] = [
@@ -47,10 +41,6 @@ pub struct Gpio {
     /// What the world outside drives, as pins driven and their levels.
     driven: u32,
     levels: u32,
-    /// Locked pins; the pins of a sequence under way, and how many of its writes are done.
-    locked: u32,
-    locking: (u32, usize),
-    broken: Option<Rule>,
 }
 
 impl Gpio {
@@ -67,7 +57,7 @@ impl Gpio {
         registers.set(MODER, mode);
         registers.set(0x08, speed);
         registers.set(PUPDR, pull);
-        Self { registers, driven, levels, locked: 0, locking: (0, 0), broken: None }
+        Self { registers, driven, levels }
     }
 
     pub fn role(&self, pin: u32) -> Role {
@@ -106,32 +96,6 @@ impl Gpio {
         self.levels = if level == Some(true) { self.levels | bit } else { self.levels & !bit };
     }
 
-    /// A write to the lock: three of the same pins, in the sequence of the key, lock them until
-    /// the next reset.
-    fn lock(&mut self, word: u32) {
-        let (pins, done) = self.locking;
-        let same = done == 0 || word & !KEY == pins;
-        let next = if same && word & KEY == SEQUENCE[done] { done + 1 } else { 0 };
-        self.locking = (word & !KEY, next % SEQUENCE.len());
-        if next == SEQUENCE.len() && self.locked == 0 {
-            self.locked = KEY | word;
-        }
-    }
-
-    /// Bits of a configuration register that belong to locked pins.
-    fn locked_bits(&self, offset: u32) -> u32 {
-        let (first, bits) = match offset {
-            MODER | 0x08 | PUPDR => (0, 2),
-            0x04 => (0, 1),
-            AFRL => (0, 4),
-            0x24 => (8, 4),
-            _ => return 0,
-        };
-        let pins = (first..16).take_while(|pin| (pin - first) * bits < 32);
-        let locked = pins.filter(|pin| self.locked >> pin & 1 != 0);
-        locked.fold(0, |word, pin| word | ((1 << bits) - 1) << ((pin - first) * bits))
-    }
-
     /// What the world outside does: pins driven, and their levels.
     pub const fn outside(&self) -> (u32, u32) {
         (self.driven, self.levels)
@@ -146,7 +110,6 @@ impl Peripheral for Gpio {
                 Some((0..16).filter(high).fold(0, |word, pin| word | 1 << pin))
             }
             BSRR | BRR => Some(0),
-            LCKR => Some(self.locked),
             _ => self.registers.read(offset),
         }
     }
@@ -158,21 +121,9 @@ impl Peripheral for Gpio {
             // Setting goes before resetting.
             BSRR => self.registers.set(ODR, old & !(ones >> 16) | ones & 0xFFFF),
             BRR => self.registers.set(ODR, old & !ones),
-            LCKR => self.lock(write.value),
-            _ => {
-                let old = self.registers.read(offset)?;
-                let locked = self.locked_bits(offset);
-                if (write.onto(old) ^ old) & locked != 0 {
-                    self.broken = Some(Rule::PinLock);
-                }
-                return self.registers.write(offset, Write { mask: write.mask & !locked, ..write });
-            }
+            _ => return self.registers.write(offset, write),
         }
         Some(())
-    }
-
-    fn take_broken_rule(&mut self) -> Option<Rule> {
-        self.broken.take()
     }
 }
 

@@ -1,12 +1,11 @@
 //! A timer with PWM on channel 1 and a break input: TIM1 and TIM8.
 //!
 //! Source: RM0440, advanced-control timers: repetition counter, one-pulse mode, PWM modes, break
-//! function; the lock is in `TIMx_BDTR`.
+//! function.
 
 use super::encoder::filter_cycles;
 use super::registers::{Kept, Registers};
 use super::{Peripheral, Write};
-use crate::rules::Rule;
 
 const CR1: u32 = 0x00;
 const SR: u32 = 0x10;
@@ -26,7 +25,6 @@ const ENABLE: u32 = 1;
 const ONE_PULSE: u32 = 1 << 3;
 /// Counting up, edge-aligned.
 const PLAIN: u32 = ENABLE | 1 << 1 | 1 << 2 | ONE_PULSE | 1 << 7;
-const ALL: u32 = u32::MAX;
 const MOE: u32 = 1 << 15;
 const BREAK_ENABLE: u32 = 1 << 12;
 const BREAK_HIGH: u32 = 1 << 13;
@@ -34,10 +32,6 @@ const BREAK_HIGH: u32 = 1 << 13;
 /// is cleared, which is possible only once its cause has gone.
 const BREAK_FLAG: u32 = 1 << 7;
 const SYSTEM_BREAK_FLAG: u32 = 1 << 13;
-
-/// Of `BDTR`: the level of the lock, and the fields that level 1 and level 2 protect.
-const LOCK: u32 = 3 << 8;
-const LOCKED: [u32; 2] = [0x3FFF_70FF, 0xC00];
 
 const REGISTERS: [Kept; 15] = [
     Kept { offset: CR1, reset: 0, mask: PLAIN | 0x300 },
@@ -52,7 +46,7 @@ const REGISTERS: [Kept; 15] = [
     Kept { offset: CCR1 + 4, reset: 0, mask: 0xFFFF },
     Kept { offset: CCR1 + 8, reset: 0, mask: 0xFFFF },
     Kept { offset: CCR1 + 12, reset: 0, mask: 0xFFFF },
-    Kept { offset: BDTR, reset: 0, mask: 0x0FFF_FFFF },
+    Kept { offset: BDTR, reset: 0, mask: 0x0FFF_FCFF },
     Kept { offset: AF1, reset: 1, mask: 0x201 },
     Kept { offset: 0x64, reset: 1, mask: 0x201 },
 ];
@@ -76,9 +70,6 @@ pub struct Pwm {
     /// Cycles for which the output was high up to the cycle `since`.
     high: u64,
     since: u64,
-    /// `BDTR` has been written: `LOCK` stays as it is.
-    lock_settled: bool,
-    broken: Option<Rule>,
     /// Level at the break input.
     pin: bool,
     /// Cycle at which the filter takes the break input for active.
@@ -104,8 +95,6 @@ impl Pwm {
             update: u64::MAX,
             high: 0,
             since: 0,
-            lock_settled: false,
-            broken: None,
             pin,
             breaks: u64::MAX,
             system: false,
@@ -119,23 +108,6 @@ impl Pwm {
 
     fn counter(&self, now: u64) -> u64 {
         if self.runs() { (now - self.origin) / self.prescaler % self.period } else { self.stopped }
-    }
-
-    /// Bits of a register that the lock protects.
-    fn locked(&self, offset: u32) -> u32 {
-        let level = self.registers.get(BDTR) >> 8 & 3;
-        let from = |least: u32, bits: u32| if level >= least { bits } else { 0 };
-        match offset {
-            // Idle states of the outputs.
-            0x04 => from(1, 0x0005_FF00),
-            BDTR => from(1, LOCKED[0]) | from(2, LOCKED[1]),
-            AF1 | 0x64 => from(1, ALL),
-            // Polarities.
-            CCER => from(2, 0x0022_AAAA),
-            // Modes and preloads of the compares.
-            CCMR1 | 0x1C => from(3, 0x0101_7878),
-            _ => 0,
-        }
     }
 
     /// Cycles up to `now` for which channel 1 was high at its pin.
@@ -261,20 +233,8 @@ impl Peripheral for Pwm {
         }
     }
 
-    fn write(&mut self, offset: u32, mut write: Write, now: u64) -> Option<()> {
+    fn write(&mut self, offset: u32, write: Write, now: u64) -> Option<()> {
         self.advance(now);
-        if let Some(old) = self.registers.read(offset) {
-            let changed = write.onto(old) ^ old;
-            let locked = self.locked(offset);
-            let settled = if offset == BDTR && self.lock_settled { LOCK } else { 0 };
-            self.broken = match (changed & locked != 0, changed & settled != 0) {
-                (true, _) => Some(Rule::TimerLock),
-                (_, true) => Some(Rule::TimerLockOnce),
-                _ => None,
-            };
-            write.mask &= !(locked | settled);
-            self.lock_settled |= offset == BDTR;
-        }
         match offset {
             SR => {
                 let kept = if self.is_system_break() { SYSTEM_BREAK_FLAG } else { 0 };
@@ -284,11 +244,8 @@ impl Peripheral for Pwm {
                 self.stopped = write.value.into();
                 self.origin = now.wrapping_sub(self.stopped * self.prescaler);
             }
-            EGR if write.ones() & !1 == 0 => {
-                if write.ones() & 1 != 0 {
-                    self.load(now);
-                }
-            }
+            EGR if write.ones() == 1 => self.load(now),
+            EGR if write.ones() == 0 => {}
             CR1 if write.ones() & !(PLAIN | 0x300) == 0 => {
                 let (ran, counter) = (self.runs(), self.counter(now));
                 self.registers.write(CR1, write)?;
@@ -325,10 +282,6 @@ impl Peripheral for Pwm {
         Some(())
     }
 
-    fn take_broken_rule(&mut self) -> Option<Rule> {
-        self.broken.take()
-    }
-
     fn deadline(&self) -> u64 {
         let trips = self.registers.get(BDTR) & MOE != 0;
         self.update.min(if trips { self.breaks } else { u64::MAX })
@@ -358,7 +311,7 @@ mod tests {
     const PERIOD: u64 = 8500;
 
     fn write(timer: &mut Pwm, offset: u32, value: u32, now: u64) {
-        timer.write(offset, Write { value, mask: ALL }, now).expect("modelled");
+        timer.write(offset, Write { value, mask: u32::MAX }, now).expect("modelled");
     }
 
     fn moe(timer: &mut Pwm) -> bool {

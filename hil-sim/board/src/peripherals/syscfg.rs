@@ -16,7 +16,7 @@ const REGISTERS: [Kept; 7] = [
     Kept { offset: EXTICR + 4, reset: 0, mask: 0xFFFF },
     Kept { offset: EXTICR + 8, reset: 0, mask: 0xFFFF },
     Kept { offset: EXTICR + 12, reset: 0, mask: 0xFFFF },
-    Kept { offset: CFGR2, reset: 0, mask: 0xF },
+    Kept { offset: CFGR2, reset: 0, mask: 0xB },
 ];
 
 /// System configuration.
@@ -35,19 +35,9 @@ impl Syscfg {
         self.0.get(EXTICR + line / 4 * 4) >> (line % 4 * 4) & 0xF
     }
 
-    /// Whether the settings of the supply's detector are locked: `PVDL`.
-    pub fn locks_detector(&self) -> bool {
-        self.0.get(CFGR2) & 1 << 2 != 0
-    }
-
     /// Whether a locked-up core stops the motor timers.
     pub fn lockup_breaks(&self) -> bool {
         self.0.get(CFGR2) & 1 != 0
-    }
-
-    /// Whether a supply below the detector's threshold does.
-    pub fn supply_breaks(&self) -> bool {
-        self.0.get(CFGR2) & 1 << 2 != 0
     }
 
     /// Whether two wrong bits in flash do.

@@ -1,7 +1,7 @@
 //! Where the models differ from the description, and why.
 
 /// Values after reset.
-pub(super) const RESETS: [(&str, &str); 7] = [
+pub(super) const RESETS: [(&str, &str); 6] = [
     (
         "EXTI.IMR1 EXTI.IMR2",
         "by RM0440, EXTI_IMRx, the lines without an edge are not masked; the description's value has \
@@ -10,23 +10,21 @@ pub(super) const RESETS: [(&str, &str); 7] = [
     ("TIM1.AF* TIM8.AF*", "by RM0440, TIMx_AFx, BKINE and BK2INE are 1 after reset"),
     ("RCC.CR", "by RM0440, RCC_CR, HSI is on and ready; the description's bits are no fields"),
     ("FLASH.ACR", "by RM0440, FLASH_ACR, DBG_SWEN is 1 after reset"),
-    ("CRC.DR16 CRC.DR8", "narrow views of DR, read here as a word"),
     ("GPIO*.IDR", "levels at the pins: pull-ups of the debug port, emergency stop, button"),
     ("DBGMCU.IDCODE", "the chip's identity, category 3, revision X"),
 ];
 
 /// Fields.
-pub(super) const FIELDS: [(&str, &str); 9] = [
+pub(super) const FIELDS: [(&str, &str); 8] = [
     ("TIM*.SR.*", "flags, cleared by 0; the description has them as written"),
     ("TIM*.EGR.UG", "a command: reads as 0"),
     ("IWDG.KR.KEY", "a command: reads as 0"),
     ("EXTI.SWIER1.*", "a command: the model clears it at once, the chip with the flag"),
-    ("SPI1.DR8.DR SPI1.DR.DR CRC.DR*", "what is written is not what is read"),
+    ("SPI1.DR8.DR SPI1.DR.DR", "what is written is not what is read"),
     (
-        "DMA1.IFCR.* RCC.CSR.RMVF FLASH.SR.* FLASH.ECCR.ECCC* FLASH.ECCR.ECCD* CRC.CR.RESET",
+        "DMA1.IFCR.* RCC.CSR.RMVF FLASH.SR.* FLASH.ECCR.ECCC* FLASH.ECCR.ECCD*",
         "cleared or reset by 1; reads as 0",
     ),
     ("FLASH.CR.STRT FLASH.CR.OPTLOCK", "set alone; cleared by the end of the operation or a key"),
     ("GPIO*.BSRR.* GPIO*.BRR.*", "a command: reads as 0"),
-    ("GPIO*.LCKR.*", "takes effect by the sequence of its key"),
 ];

@@ -79,9 +79,8 @@ pub struct Control {
 
 impl Control {
     pub(super) fn new(vectors: u32) -> Self {
-        // The engine does not report the address of a fault. The status of debug events is what
-        // probe-rs 0.32 leaves of it (armv7m.rs): it clears it as it attaches and whenever it asks
-        // for the core's status.
+        // The engine does not report the address of a fault. The status of debug events is cleared
+        // by a probe whenever it asks for the core's status (probe-rs 0.32, armv7m.rs).
         let zeros = [DFSR, MMFAR, BFAR, AFSR];
         let mut registers = Registers::new(&REGISTERS, &[CPACR, DEMCR, FPDSCR], &zeros);
         registers.set(VTOR, vectors);
