@@ -30,7 +30,6 @@ pub struct Probe {
 /// Read offset of each channel up after its last read, as probe-rs keeps it.
 type Offsets = [Option<u32>; 8];
 
-/// Channels at this control block.
 struct Link<'a> {
     block: u32,
     machine: &'a mut Machine,

@@ -77,7 +77,6 @@ impl RealPort {
     }
 }
 
-/// The session, as what finds and uses the channels.
 struct Link<'a> {
     session: &'a mut Session,
     block: Option<u32>,

@@ -12,7 +12,9 @@ use embassy_stm32::timer::complementary_pwm::{
 };
 use embassy_stm32::timer::low_level::CountingMode;
 use embassy_stm32::timer::simple_pwm::{PwmPin, PwmPinConfig};
-use embassy_stm32::timer::{AdvancedInstance4Channel, BkIn1, BreakInputPin, Ch1, TimerPin};
+use embassy_stm32::timer::{
+    AdvancedInstance4Channel, BkIn1, BreakInputPin, Ch1, Channel, TimerPin,
+};
 use interstage::hal::Motors;
 use interstage::sense::raw::BridgeCodes;
 use interstage::units::MotorCommand;
@@ -85,7 +87,7 @@ impl<T: AdvancedInstance4Channel + Peripheral<Registers = TimAdv>> Bridge<T> {
         let registers = T::registers();
         registers.cr1().modify(|w| w.set_opm(true));
         let period = pwm.get_max_duty();
-        let bridge = Self {
+        let mut bridge = Self {
             pwm: ManuallyDrop::new(pwm),
             registers,
             period,
@@ -96,8 +98,8 @@ impl<T: AdvancedInstance4Channel + Peripheral<Registers = TimAdv>> Bridge<T> {
         bridge.chop(0);
         // Low at the begin of a period, where a pulse stops, and high behind the compare.
         registers.ccmr_output(0).modify(|w| w.set_ocm(0, Ocm::PWM_MODE2));
-        registers.ccer().modify(|w| w.set_cce(0, true));
-        registers.bdtr().modify(|w| w.set_bke(0, true));
+        bridge.pwm.enable(Channel::Ch1);
+        bridge.pwm.set_break_enable(true);
         bridge
     }
 
