@@ -22,7 +22,7 @@ pub(crate) mod verdict;
 pub use beside::beside_svg;
 pub use compare::{Difference, compare_html, differences};
 pub(crate) use page::capital;
-pub use page::{Section, html, page_of};
+pub use page::{Section, html, log_html, page_of};
 pub use panels::overview_svg;
 pub(crate) use scene::Geometry;
 

@@ -60,8 +60,8 @@ impl LogFiles {
         bare: bool,
         scenario: &Scenario,
     ) -> Result<Self, Failure> {
-        make_directory(folder)?;
         let name = free_name(folder, name)?;
+        make_directory(folder)?;
         let mcap = folder.join(format!("{name}.mcap"));
         let csv = (!bare).then(|| folder.join(format!("{name}.csv")));
         let table = csv.as_deref().map(created).transpose()?;
@@ -160,7 +160,11 @@ fn free_name(folder: &Path, asked: Option<&str>) -> Result<String, Failure> {
         let all = ["mcap", "csv"].map(|ending| folder.join(format!("{name}.{ending}")));
         all.into_iter().find(|path| path.exists())
     };
+    let is_plain = |name: &str| Path::new(name).file_name().is_some_and(|file| file == name);
     match asked {
+        Some(name) if !is_plain(name) => {
+            Err(Failure::input(format!("--name {name}: a name without a folder is expected")))
+        }
         Some(name) => match taken(name) {
             Some(path) => {
                 let path = path.display();

@@ -71,6 +71,9 @@ struct Measure {
 }
 
 pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
+    if args.crossing {
+        args.run.no_controller("speed and preload of a crossing are given")?;
+    }
     let base = args.run.resolve()?;
     let axes = axes(args, &base)?;
     let places = sweep::places(&axes);

@@ -99,6 +99,9 @@ pub struct Summary {
     /// What is missing of the log that this was read from, in sentences.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub missing: Vec<String>,
+    /// What restarted the controller and so ended the recording, in words.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub restart: Option<String>,
     /// From the accepted command to arrival, or to the end of the motion of a run that did not
     /// arrive, s; none if the log has no such command or nothing moved.
     pub duration_s: Option<f64>,

@@ -137,6 +137,7 @@ impl Tally {
             real_time_factor: total_s / wall_s.max(1e-9),
             trace_digest: self.digest.finalize().iter().map(|b| format!("{b:02x}")).collect(),
             crossings,
+            ..Summary::default()
         };
         Recording {
             summary,

@@ -83,6 +83,40 @@ and the undeformed wheel at the instant at which the lower wall stops carrying l
     page
 }
 
+/// The page of a log: of one start of the target as [`html`], of several a section each.
+pub fn log_html(boots: &[Recording]) -> String {
+    if let [boot] = boots {
+        return html(boot, &[]);
+    }
+    let one = |(n, boot): (usize, &Recording)| {
+        let s = &boot.summary;
+        let cause = s.restart.as_ref().map_or_else(String::new, |cause| {
+            format!("<p class=\"remark\">Ended by a restart: {}</p>\n", escape(cause))
+        });
+        let lost =
+            s.missing.iter().map(|what| format!("<p>Incomplete log: {}</p>\n", escape(what)));
+        let plots = if boot.rows.is_empty() { String::new() } else { stack(boot, Across::Time) };
+        let body = format!(
+            "<p><b>{}</b>; {}; {}</p>\n{cause}{}{}{}{plots}{}{}",
+            escape(&headline(s)),
+            gap_sentence(s),
+            slip_sentence(s),
+            lost.collect::<String>(),
+            tables::ledger(&s.crossings),
+            tables::reports(s),
+            folded("The crossings enlarged", &crossings::html(boot)),
+            folded("Lines of the log", &tables::log(&boot.log)),
+        );
+        section(&format!("Start {} of {}", n + 1, boots.len()), &body)
+    };
+    let sections: String = boots.iter().enumerate().map(one).collect();
+    let moved = boots.iter().map(|boot| &boot.summary).filter(|s| s.moving_s > 0.0);
+    let grade = moved.map(Grade::of).max_by_key(|grade| *grade as u8).map_or("fair", Grade::name);
+    let title = boots.last().map_or_else(String::new, |boot| origin(&boot.summary));
+    let headline = format!("{} starts of the controller, each on its own clock", boots.len());
+    page_of(&title, grade, &headline, &sections)
+}
+
 /// A page of its own: title, grade (`good`, `fair`, `bad`), headline and sections.
 pub fn page_of(title: &str, grade: &str, headline: &str, body: &str) -> String {
     let (title, headline) = (escape(title), escape(headline));

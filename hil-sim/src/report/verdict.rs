@@ -113,6 +113,9 @@ pub(crate) fn headline(summary: &Summary) -> String {
         (true, Some(fault)) => {
             format!("{verb} {travel}, with fault {}: {}", fault.code, fault.text)
         }
+        (false, None) if let Some(cause) = &summary.restart => {
+            format!("Restarted after {travel}: {cause}")
+        }
         (false, None) if !summary.missing.is_empty() => format!("Log ends after {travel}"),
         (false, None) => format!("Did not complete: {travel}"),
         (false, Some(fault)) => {

@@ -6,6 +6,8 @@ use hil_sim::scenario::Scenario;
 use hil_sim::session;
 use serde_json::Value;
 
+use crate::record::logs::data;
+
 use super::{code, good, number, object, refused_in, rig, rig_in, stderr, stdout};
 
 /// The frames of a deployment.
@@ -100,6 +102,39 @@ fn a_log_has_its_report_and_two_logs_their_comparison() {
     let change = number(gap, "b") - number(gap, "a");
     assert!(change != 0.0 && (number(gap, "change") - change).abs() < 1e-12);
     assert!(page("a/log.compare.html").contains("B - A"));
+}
+
+/// A capture with resets of the board in it: every start has its own clock and its own page.
+#[test]
+fn a_log_with_resets_is_shown_start_by_start() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let at = directory.path();
+    std::fs::copy(data("resets-1.mcap"), at.join("log.mcap")).expect("copied");
+    let found = object(&rig_in(at, &["report", "log.mcap", "--json"]));
+    let starts = found["starts"].as_array().unwrap_or_else(|| panic!("{found}"));
+    assert_eq!(starts.len(), 10);
+    let crossings = |of: &Value| of["crossings"].as_array().expect("a list").clone();
+    assert_eq!(starts.iter().map(|start| crossings(start).len()).sum::<usize>(), 8);
+    for start in starts {
+        let end = number(start, "total_s");
+        let mut before = 0.0;
+        for line in crossings(start) {
+            let [touch, lift] = ["touch_s", "lift_s"].map(|key| number(&line, key));
+            let first = touch.min(lift);
+            assert!(before < first && touch.max(lift) < end, "{line} in a start of {end} s");
+            assert!((touch - lift).abs() < 4.0, "{line}");
+            before = touch.max(lift);
+        }
+    }
+    let page = std::fs::read_to_string(at.join("log.html")).expect("a page");
+    assert!(page.contains("10 starts of the controller"));
+    assert_eq!(page.matches("Ended by a restart: ").count(), 9);
+    assert!(page.contains("<h2>Start 10 of 10</h2>"));
+    // The cause is the target's own word.
+    let cause = starts[0]["restart"].as_str().expect("a cause");
+    assert!(cause.contains("before: "), "{cause}");
+    assert!(starts[9]["restart"].is_null());
+    refused_in(at, &["report", "log.mcap", "log.mcap"], &["log.mcap: 10 starts"]);
 }
 
 #[test]
