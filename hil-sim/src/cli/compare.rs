@@ -17,7 +17,7 @@ use crate::table::{number, plain};
 /// The reserve below the reference gap of each is tuned until its worst gap over all rigs is
 /// the reference; then the times are comparable. The oracle knows each plant in advance and
 /// has the same actuators; it keeps the worst gap and the least slip margin of the scheduled
-/// run on that plant.
+/// run on that plant. A rig takes about 5 s of one core with the oracle, 0.2 s without.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
     /// How many rigs: the seeds that follow --seed.

@@ -7,10 +7,13 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use interstage::log::identity::fingerprint;
+use serde_json::{Value, json};
 
 use super::failure::Failure;
 use crate::files::make_directory;
-use crate::record::{Counts, Header, Item, Metadata, WriteError, Writer, write_metadata};
+use crate::record::{
+    Counts, Header, Item, Metadata, WriteError, Writer, recordings, write_metadata,
+};
 use crate::scenario::Scenario;
 
 /// Ctrl-C as a request to end with complete files.
@@ -118,7 +121,7 @@ impl LogFiles {
         let metadata = Metadata {
             header: self.header.clone(),
             parameters: self.parameters.clone(),
-            ticks: None,
+            ..Metadata::default()
         };
         self.csv.as_ref().map_or(Ok(()), |csv| {
             write_metadata(csv, &metadata, false)?;
@@ -143,7 +146,12 @@ impl LogFiles {
     ) -> Result<(Counts, Vec<PathBuf>), Failure> {
         let Self { writer, folder, mcap, csv, header, parameters, .. } = self;
         let counts = writer.finish(see).map_err(|error| failed(&folder, error))?;
-        let metadata = Metadata { header, parameters, ticks: Some(counts.ticks) };
+        let starts = csv.as_ref().and_then(|_| recordings(&mcap).ok()).unwrap_or_default();
+        let crossings = match &starts[..] {
+            [start] => json!(start.summary.crossings),
+            _ => Value::Null,
+        };
+        let metadata = Metadata { header, parameters, ticks: Some(counts.ticks), crossings };
         let described =
             csv.as_ref().map(|csv| write_metadata(csv, &metadata, false)).transpose()?;
         Ok((counts, [Some(mcap), csv, described].into_iter().flatten().collect()))

@@ -30,8 +30,17 @@ pub fn result(
     }
 }
 
-/// The files that were written, a line each. Paths are not wrapped, so that they can be copied.
+/// The files that were written: a line a file, or one for a folder. Paths are not wrapped, so that
+/// they can be copied.
 pub fn wrote(files: &[PathBuf]) -> String {
+    let folder = files.first().and_then(|file| file.parent()).filter(|_| files.len() > 1);
+    if let Some(folder) = folder
+        && files.iter().all(|file| file.parent() == Some(folder))
+    {
+        let names = files.iter().filter_map(|file| file.file_name()).map(|n| n.to_string_lossy());
+        let names: Vec<_> = names.collect();
+        return format!("  wrote {}/: {}\n", folder.display(), names.join(", "));
+    }
     files.iter().map(|file| format!("  wrote {}\n", file.display())).collect()
 }
 

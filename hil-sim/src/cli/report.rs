@@ -35,6 +35,10 @@ pub(super) struct Args {
     #[arg(long, value_name = "FILE", requires = "other")]
     picture: Option<PathBuf>,
 
+    /// Every column of the table of crossings.
+    #[arg(short, long)]
+    verbose: bool,
+
     /// Prints the ledger or the differences as one JSON object.
     #[arg(long)]
     json: bool,
@@ -70,14 +74,16 @@ fn one(args: &Args, log: &Path, boots: &[Recording]) -> Result<Outcome, Failure>
         let one = |(n, boot): (usize, &Recording)| {
             let cause = boot.summary.restart.as_ref().map(|cause| format!(" ended by: {cause}"));
             let head = format!("start {} of {}{}\n", n + 1, boots.len(), cause.unwrap_or_default());
-            head + &terminal::run(&boot.summary, &[])
+            head + &terminal::run(&boot.summary, &[], args.verbose)
         };
         boots.iter().enumerate().map(one).collect::<String>() + &output::wrote(&files)
     };
     match boots {
         [boot] => {
             let printed = WithFiles { result: &boot.summary, files: &files };
-            output::result(args.json, &printed, || terminal::run(&boot.summary, &files))?;
+            output::result(args.json, &printed, || {
+                terminal::run(&boot.summary, &files, args.verbose)
+            })?;
         }
         _ => {
             let summaries: Vec<&Summary> = boots.iter().map(|boot| &boot.summary).collect();

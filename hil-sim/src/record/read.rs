@@ -198,7 +198,7 @@ fn of_mcap(bytes: &[u8]) -> Run {
 /// Reads the controller's columns. Ticks that did not run and an incomplete last row are left
 /// out.
 fn of_csv(bytes: &[u8], metadata: TableMetadata) -> Result<Run, String> {
-    let TableMetadata { header, parameters, ticks: total } = metadata;
+    let TableMetadata { header, parameters, ticks: total, .. } = metadata;
     let mut run = Run { header, parameters, ..Run::default() };
     // A last row without its line feed may lack digits.
     let ends_within = bytes.last() != Some(&b'\n');

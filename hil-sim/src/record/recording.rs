@@ -164,6 +164,7 @@ fn summary(run: &Run) -> Summary {
             .to_owned(),
         direction: if retracts { "retract" } else { "deploy" }.to_owned(),
         rig: header.rig,
+        commanded_s: commanded(run).map(|at| 1e-3 * f64::from(at)),
         duration_s: last.zip(commanded(run)).map(|(row, at)| row.t_s - 1e-3 * f64::from(at)),
         lost: lost(run, scenario.as_ref()),
         moving_s: between(|row| row.t_s),

@@ -6,7 +6,7 @@ use super::axis;
 use super::palette;
 use super::panel::{Line, Look, Marks, Panel, Rule, Shape};
 use super::svg;
-use crate::record::{CrossingLine, Recording, Tick};
+use crate::record::{CrossingLine, Recording, Report, Tick};
 
 /// From one mark of a crossing to the next, drawing units.
 const SIDE: i32 = 22;
@@ -24,7 +24,7 @@ const AXIS_HEIGHT: u32 = 36;
 /// What the horizontal axis shows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Across {
-    /// Time since boot.
+    /// The recording's own time.
     Time,
     /// Time since this time, the first touch of a corner, s.
     Since(f64),
@@ -36,7 +36,7 @@ impl Across {
     /// Name of the axis, with its unit.
     pub(super) fn name(self) -> &'static str {
         match self {
-            Self::Time => "time since boot, s",
+            Self::Time => "time, s",
             Self::Since(_) => "time since the corner touched, s",
             Self::Position => "axial position, mm",
         }
@@ -126,6 +126,7 @@ impl<'a> View<'a> {
                 .crossings
                 .iter()
                 .flat_map(|c| rules(rows, across, c))
+                .chain(reports(recording, across))
                 .collect(),
             limit_n: parameter(&recording.parameters, "preload", "limit_n"),
         }
@@ -281,8 +282,8 @@ fn rules(rows: &[Tick], across: Across, line: &CrossingLine) -> Vec<Rule> {
     let long = matches!(across, Across::Since(_));
     let touch = Rule {
         x: across.at(rows, line.touch_s),
-        name: if long { "corner touches" } else { "touch" },
-        touch: true,
+        name: if long { "corner touches" } else { "touch" }.to_owned(),
+        colour: palette::TOUCH,
     };
     let from = rows.partition_point(|row| row.controller.t_s < line.touch_s.min(line.lift_s));
     let ahead = |row: &Tick| row.position_mm() < line.step_mm;
@@ -292,8 +293,22 @@ fn rules(rows: &[Tick], across: Across, line: &CrossingLine) -> Vec<Rule> {
         Across::Position => Some(line.step_mm),
         _ => passed.map(|row| across.of(row)),
     };
-    let face = face_x.map(|x| Rule { x, name: "face", touch: false });
+    let name = format!("step {}", line.index);
+    let face = face_x.map(|x| Rule { x, name, colour: palette::FACE });
     [touch].into_iter().chain(face).collect()
+}
+
+/// Faults and limits, by their codes.
+fn reports(recording: &Recording, across: Across) -> Vec<Rule> {
+    let Recording { summary, rows, .. } = recording;
+    let rule = |(report, colour): (&Report, RGBColor)| Rule {
+        x: across.at(rows, report.t_s),
+        name: report.code.to_string(),
+        colour,
+    };
+    let faults = summary.faults.iter().map(|report| (report, palette::LIMIT));
+    let limits = summary.limits.iter().map(|report| (report, palette::WARNING));
+    faults.chain(limits).map(rule).collect()
 }
 
 /// Speed, preload, gap and radius of a run over time, stacked, as an SVG of 1000 x 820.

@@ -137,6 +137,20 @@ fn a_log_with_resets_is_shown_start_by_start() {
     refused_in(at, &["report", "log.mcap", "log.mcap"], &["log.mcap: 10 starts"]);
 }
 
+/// The log's line of a crossing and the ledger's have one lead.
+#[test]
+fn a_lead_has_one_meaning_on_a_page() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let output = rig_in(directory.path(), &["deploy", "--out", "run", "--log", "--json"]);
+    let (found, log) = (object(&output), stderr(&output));
+    let mut logged = log.lines().filter(|line| line.contains("] crossing "));
+    for line in found["crossings"].as_array().expect("a list") {
+        let logged = logged.next().expect("a line of the crossing");
+        let lead = format!("lead {:.2} s", number(line, "lead_time_s"));
+        assert!(logged.contains(&lead), "{lead}: {logged}");
+    }
+}
+
 #[test]
 fn a_view_without_terminal_ends_by_itself() {
     let output = rig(&["live", "--headless", "--fast", "--listen", "127.0.0.1:0"]);
@@ -149,7 +163,7 @@ fn a_view_records_what_it_shows() {
     let view = ["live", "--headless", "--fast", "--listen", "127.0.0.1:0", "--record", "kept"];
     let output = rig_in(directory.path(), &[&view[..], &["--set", "tread.tau_s=0.11"]].concat());
     assert_eq!(code(&output), 0, "{}", stderr(&output));
-    assert!(stdout(&output).contains("wrote kept/log.mcap"), "{}", stdout(&output));
+    assert!(stdout(&output).contains("wrote kept/: log.mcap"), "{}", stdout(&output));
     let replayed = rig_in(directory.path(), &["replay", "kept/log.mcap", "kept/log.csv", "--json"]);
     let replayed = object(&replayed);
     assert_eq!(replayed["equal"], true, "{replayed}");

@@ -66,10 +66,10 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     }
     let printed = Printed { summary, account: &ran.load, missed: &missed, files: &files };
     output::result(args.json, &printed, || {
-        terminal::run(summary, &files) + &ran.load.text(&missed)
+        terminal::run(summary, &files, args.verbose) + &ran.load.text(&missed)
     })?;
     let clean = ran.load.unmodelled.is_empty();
-    Ok(Outcome::of(summary.completed && summary.faults.is_empty() && clean))
+    Ok(Outcome::of(summary.completed && summary.faults.is_empty() && clean && missed.is_empty()))
 }
 
 /// The plant not at the board's pins, but in the loop over its debug probe.
