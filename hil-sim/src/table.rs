@@ -33,13 +33,16 @@ fn cell(column: usize, text: String) -> Cell {
 /// `value` with `decimals`; a dash if it is missing or no number.
 pub fn number(value: impl Into<Option<f64>>, decimals: usize) -> String {
     let value = value.into().filter(|value| value.is_finite());
-    let text = value.map_or_else(|| "-".to_owned(), |value| format!("{value:.decimals$}"));
-    // What rounds to zero has no sign.
-    match text.strip_prefix('-') {
-        Some(zero) if zero.starts_with('0') && !zero.contains(|c| ('1'..='9').contains(&c)) => {
-            zero.to_owned()
-        }
-        _ => text,
+    value.map_or_else(|| "-".to_owned(), |value| label(value, decimals))
+}
+
+/// `value` with `decimals`, without a negative zero.
+pub fn label(value: f64, decimals: usize) -> String {
+    let text = format!("{value:.decimals$}");
+    if text.trim_start_matches(['-', '0', '.']).is_empty() {
+        text.trim_start_matches('-').to_owned()
+    } else {
+        text
     }
 }
 

@@ -9,8 +9,8 @@ use super::output::{self, WithFiles};
 use super::terminal;
 use crate::files::{make_directory, vacant_for, write_text};
 use crate::record::{Recording, Summary, log_at, recordings};
-use crate::report::{Difference, beside_svg, compare_html, differences, log_html};
-use crate::table;
+use crate::report::{Difference, beside_svg, compare_html, compared, differences, log_html};
+use crate::table::plain;
 
 /// The page of a log as `deploy` writes it, or of two logs crossing by crossing.
 ///
@@ -61,9 +61,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
 /// Where a page with this text goes: beside the first log a page of another content is kept.
 fn page(args: &Args, log: &Path, ending: &str, text: &str) -> Result<PathBuf, Failure> {
     let page = args.out.clone().unwrap_or_else(|| vacant_for(&log.with_extension(ending), text));
-    if let Some(directory) = page.parent().filter(|directory| !directory.as_os_str().is_empty()) {
-        make_directory(directory)?;
-    }
+    page.parent().map_or(Ok(()), make_directory)?;
     write_text(&page, text)?;
     Ok(page)
 }
@@ -72,9 +70,8 @@ fn one(args: &Args, log: &Path, boots: &[Recording]) -> Result<Outcome, Failure>
     let files = [page(args, log, "html", &log_html(boots))?];
     let human = || {
         let one = |(n, boot): (usize, &Recording)| {
-            let cause = boot.summary.restart.as_ref().map(|cause| format!(" ended by: {cause}"));
-            let head = format!("start {} of {}{}\n", n + 1, boots.len(), cause.unwrap_or_default());
-            head + &terminal::run(&boot.summary, &[], args.verbose)
+            let text = terminal::run(&boot.summary, &[], args.verbose);
+            format!("start {} of {}: {text}", n + 1, boots.len())
         };
         boots.iter().enumerate().map(one).collect::<String>() + &output::wrote(&files)
     };
@@ -139,10 +136,7 @@ fn titles(runs: [(&String, &Recording); 2]) -> [String; 2] {
 }
 
 fn human(differences: &[Difference]) -> String {
-    let rows = differences.iter().map(|difference| {
-        let Difference { index, quantity, unit, decimals, a, b, change } = difference;
-        let value = |value: &Option<f64>| table::number(*value, *decimals);
-        vec![format!("{index}"), format!("{quantity}, {unit}"), value(a), value(b), value(change)]
-    });
-    format!("{}\n", table::plain(&["step", "quantity", "A", "B", "B - A"], rows))
+    let (head, rows) = compared(differences);
+    let head: Vec<&str> = head.iter().map(String::as_str).collect();
+    format!("{}\n", plain(&head, rows))
 }

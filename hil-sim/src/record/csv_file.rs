@@ -21,8 +21,7 @@ pub struct Metadata {
     pub parameters: Option<String>,
     /// Ticks that ran, once the log is complete.
     pub ticks: Option<u64>,
-    /// The ledger of the crossings as in `summary.json`, once the log is complete; null in a log of
-    /// several starts.
+    /// The ledger of the crossings, once the log is complete; null in a log of several starts.
     #[serde(default)]
     pub crossings: Value,
 }

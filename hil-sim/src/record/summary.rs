@@ -163,7 +163,7 @@ pub struct Recording {
 
 impl Recording {
     /// The recording with its times counted from the command, if the log has it.
-    pub(crate) fn from_command(&self) -> Self {
+    pub(crate) fn since_command(&self) -> Self {
         let mut from = self.clone();
         let zero_s = self.summary.commanded_s.unwrap_or(0.0);
         let Summary { faults, limits, crossings, .. } = &mut from.summary;

@@ -150,7 +150,6 @@ impl Tally {
             trace_digest: self.digest.finalize().iter().map(|b| format!("{b:02x}")).collect(),
             restart: self.restart,
             crossings,
-            ..Summary::default()
         };
         Recording {
             summary,

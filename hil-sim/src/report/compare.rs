@@ -70,26 +70,23 @@ pub fn compare_html((name_a, a): (&str, &Recording), (name_b, b): (&str, &Record
             escape(&gap_sentence(&run.summary)),
         );
     }
-    page += &section("Crossing by crossing", &table(&differences(a, b)));
+    let (head, rows) = table(&differences(a, b));
+    page += &section("Crossing by crossing", &tables::table("ledger", &head, rows));
     let picture = beside_svg([("A", a), ("B", b)]);
     page += &section("Over time", &format!("<figure class=\"wide\">{picture}</figure>\n"));
     page + "</main>\n</body>\n</html>\n"
 }
 
-fn table(differences: &[Difference]) -> String {
-    if differences.is_empty() {
-        return "<p>Neither run crossed a step.</p>\n".to_owned();
-    }
-    let head = ["step", "quantity", "A", "B", "B - A"].map(str::to_owned);
+/// The differences as a table's head and rows.
+pub fn table(differences: &[Difference]) -> (Vec<String>, Vec<Vec<String>>) {
+    let head = ["step", "quantity", "A", "B", "B - A"].map(str::to_owned).to_vec();
     let rows =
         differences.iter().map(|Difference { index, quantity, unit, decimals, a, b, change }| {
-            let change =
-                change.map_or_else(|| number(None, 0), |change| format!("{change:+.decimals$}"));
-            let (a, b) = (number(*a, *decimals), number(*b, *decimals));
+            let [a, b, change] = [a, b, change].map(|value| number(*value, *decimals));
             let unit = if unit.is_empty() { String::new() } else { format!(", {unit}") };
             vec![index.to_string(), format!("{quantity}{unit}"), a, b, change]
         });
-    tables::table("ledger", &head, rows.collect())
+    (head, rows.collect())
 }
 
 #[cfg(test)]

@@ -26,7 +26,7 @@ pub struct Section {
 /// The page of `recording`, with `more` sections. It needs no other file; without its
 /// script it lacks the animation alone.
 pub fn html(recording: &Recording, more: &[Section]) -> String {
-    let recording = &recording.from_command();
+    let recording = &recording.since_command();
     let s = &recording.summary;
     let title = escape(&format!("{} on {}, seed {}", s.direction, s.rig, s.seed));
     let grade = Grade::of(s).name();
@@ -91,7 +91,7 @@ pub fn log_html(boots: &[Recording]) -> String {
         return html(boot, &[]);
     }
     let one = |(n, boot): (usize, &Recording)| {
-        let boot = &boot.from_command();
+        let boot = &boot.since_command();
         let s = &boot.summary;
         let cause = s.restart.as_ref().map_or_else(String::new, |cause| {
             format!("<p class=\"remark\">Ended by a restart: {}</p>\n", escape(cause))

@@ -84,6 +84,7 @@ pub(crate) struct Marks {
 }
 
 /// One plot.
+#[derive(Default)]
 pub(crate) struct Panel {
     pub(crate) title: String,
     /// Name of the vertical axis, with its unit.
@@ -112,6 +113,25 @@ pub(crate) struct Rule {
     pub(crate) name: String,
     /// That of a touch of a corner, a face, a fault or a limit.
     pub(crate) colour: RGBColor,
+}
+
+/// More height for the last of stacked plots, which has the axis, CSS pixels.
+const AXIS_HEIGHT: u32 = 36;
+
+/// Plots over one axis, one below the other, as an SVG of this size, CSS pixels.
+pub(crate) fn stacked(size: (u32, u32), panels: &mut [Panel]) -> String {
+    let Some((last, above)) = panels.split_last_mut() else { return String::new() };
+    let height = SCALE * (size.1 - AXIS_HEIGHT) / (above.len() as u32 + 1);
+    super::svg::fixed(size, |area| {
+        let mut rest = area.clone();
+        for panel in above {
+            panel.x_name = None;
+            let (top, below) = rest.split_vertically(height);
+            panel.draw(&top)?;
+            rest = below;
+        }
+        last.draw(&rest)
+    })
 }
 
 impl Panel {

@@ -4,7 +4,7 @@ use plotters::style::RGBColor;
 
 use super::axis;
 use super::palette;
-use super::panel::{Line, Look, Marks, Panel, Rule, Shape};
+use super::panel::{Line, Look, Marks, Panel, Rule, Shape, stacked};
 use super::svg;
 use crate::record::{CrossingLine, Recording, Report, Tick};
 
@@ -18,8 +18,6 @@ const MOTION_MM: f64 = 0.01;
 
 /// Size of the overview, CSS pixels.
 const OVERVIEW: (u32, u32) = (1000, 820);
-/// More height for its last plot, which has the time axis.
-const AXIS_HEIGHT: u32 = 36;
 
 /// What the horizontal axis shows.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -139,13 +137,9 @@ impl<'a> View<'a> {
             y_name,
             x_name: Some(self.across.name()),
             x: self.x,
-            y: None,
-            least_span: 0.0,
-            lines: Vec::new(),
-            marks: Vec::new(),
-            levels: Vec::new(),
             shades: self.shades.clone(),
             rules: self.rules.clone(),
+            ..Panel::default()
         }
     }
 
@@ -314,18 +308,7 @@ fn reports(recording: &Recording, across: Across) -> Vec<Rule> {
 /// Speed, preload, gap and radius of a run over time, stacked, as an SVG of 1000 x 820.
 pub fn overview_svg(recording: &Recording) -> String {
     let view = View::new(recording, Across::Time);
-    let mut panels = [view.speed(), view.preload(), view.gap()];
-    let height = svg::SCALE * (OVERVIEW.1 - AXIS_HEIGHT) / (panels.len() as u32 + 1);
-    svg::fixed(OVERVIEW, |area| {
-        let mut rest = area.clone();
-        for panel in &mut panels {
-            panel.x_name = None;
-            let (top, below) = rest.split_vertically(height);
-            panel.draw(&top)?;
-            rest = below;
-        }
-        view.radius().draw(&rest)
-    })
+    stacked(OVERVIEW, &mut [view.speed(), view.preload(), view.gap(), view.radius()])
 }
 
 /// The number at `section.name` of parameters written as TOML.
