@@ -1,7 +1,7 @@
 //! The record of a run: one row a tick, events, the ledger of the crossings, a summary.
 //!
 //! [`tick`] lists the columns. [`Decoder`] and [`Run`] read the controller's binary log;
-//! [`Writer`] and [`write_all`] write MCAP, CSV and JSON, [`recording`] reads them.
+//! [`Writer`] and [`write_all`] write MCAP, CSV and JSON, [`recordings`] reads them.
 
 mod columns;
 mod csv_file;
