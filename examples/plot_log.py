@@ -1,18 +1,20 @@
 """Draws a crossing from a log: `python3 examples/plot_log.py LOG.csv [STEP] [OUT.svg]`.
 
 LOG.csv is from `cargo rig deploy` or `cargo rig capture`; STEP counts from 1. The picture has the
-axle's path and the wheel at lift-off, to scale, and preload and speed over the same distance. Only
-the controller's own columns are used, so a log of a real board will do. It reads the table with
-pandas if that is installed, else with Python's own csv module.
+axle's path and the wheel at lift-off, to scale, and preload and speed over the same distance. Rig
+and crossing, with the measured gap, are those in LOG.csv-metadata.json; the rest is the controller's
+own columns, so a log of a real board will do. It reads the table with pandas if that is installed,
+else with Python's own csv module.
 """
 
 import json
 import math
 import pathlib
+import re
 import sys
 
-COLUMNS = ["stage", "level", "position_mm", "distance_mm", "radius_mm", "preload_n",
-           "preload_ref_n", "wheel_speed_mm_s", "speed_ref_mm_s", "retracts"]
+COLUMNS = ["t_s", "stage", "position_mm", "radius_mm", "preload_n", "preload_ref_n",
+           "wheel_speed_mm_s", "speed_ref_mm_s", "retracts"]
 
 
 def read(path):
@@ -38,26 +40,17 @@ def read(path):
     return {name: table[name].tolist() for name in COLUMNS}
 
 
-def rig(path):
-    """Wheel radius, step height and wall radius, mm, from the metadata beside the table."""
-    geometry = {"wheel_radius_mm": 25.0, "step_height_mm": 4.0, "wall_radius_mm": 150.0}
+def described(path):
+    """Wheel radius, step height and wall radius, mm, and the crossings, from beside the table."""
     beside = pathlib.Path(f"{path}-metadata.json")
-
-    def search(value):
-        if isinstance(value, dict):
-            for key, inner in value.items():
-                if key in geometry and isinstance(inner, (int, float)):
-                    geometry[key] = float(inner)
-                search(inner)
-        elif isinstance(value, list):
-            for inner in value:
-                search(inner)
-
-    if beside.is_file():
-        search(json.loads(beside.read_text(encoding="utf-8")))
-    else:
-        print(f"{beside.name} is not there: assuming {geometry}", file=sys.stderr)
-    return geometry["wheel_radius_mm"], geometry["step_height_mm"], geometry["wall_radius_mm"]
+    if not beside.is_file():
+        sys.exit(f"{beside}: is not there; it has the rig and the crossings of {path}")
+    note = json.loads(beside.read_text(encoding="utf-8"))["notes"][0]
+    if not note.get("parameters") or not note.get("crossings"):
+        sys.exit(f"{beside}: has no parameters or no crossings of one start")
+    rig = [re.search(rf"^{key} = ([-+.e0-9]+)", note["parameters"], re.MULTILINE)
+           for key in ("wheel_radius_mm", "step_height_mm", "wall_radius_mm")]
+    return [float(number.group(1)) for number in rig], note["crossings"]
 
 
 def polyline(points, color, width=2, dash="none"):
@@ -76,21 +69,21 @@ def main():
     path, step = sys.argv[1], int(sys.argv[2]) if len(sys.argv) > 2 else 1
     out = sys.argv[3] if len(sys.argv) > 3 else "crossing.svg"
     log = read(path)
-    radius, height, wall = rig(path)
+    (radius, height, wall), crossings = described(path)
     if 1.0 in log["retracts"]:
         sys.exit(f"{path}: a retraction; this picture is for deployments")
-    ticks = range(len(log["level"]))
-    both = [i for i in ticks if log["level"][i] == step - 1 and log["stage"][i] == "static friction"
-            and math.isfinite(log["distance_mm"][i])]
-    if not both:
-        sys.exit(f"{path}: no crossing of step {step}")
-    face = log["position_mm"][both[0]] + log["distance_mm"][both[0]]
-    lift = both[-1] + 1
-    # The wheel's centre before the face (negative) and above the lower wall, mm.
-    x = [position - face for position in log["position_mm"]]
+    found = [line for line in crossings if line["index"] == step]
+    if not found or found[0]["gap_measured_mm"] is None:
+        sys.exit(f"{path}: no crossing of step {step} whose gap was measured")
+    gap = found[0]["gap_measured_mm"]
+    ticks = range(len(log["t_s"]))
+    lift = next(i for i in ticks if log["t_s"][i] >= found[0]["lift_s"])
+    # The wheel's centre above the lower wall and before the face (negative), mm; the face is where
+    # the gap has it.
     y = [wall - (step - 1) * height - value for value in log["radius_mm"]]
+    before = math.sqrt(max((radius + gap) ** 2 - y[lift] ** 2, 0))
+    x = [position - log["position_mm"][lift] - before for position in log["position_mm"]]
     near = [i for i in ticks if -20 <= x[i] <= 8 and log["stage"][i] != "initial"]
-    gap = math.hypot(x[lift], y[lift]) - radius
 
     scale = 20.0
     px = lambda value: 480 + value * scale
@@ -105,7 +98,7 @@ def main():
            polyline([(px(x[i]), py(y[i])) for i in near], "#0550ae", 3)]
     part = gap / (radius + gap)
     svg += [polyline([(px(0), py(0)), (px(x[lift] * part), py(y[lift] * part))], "#b3202c", 5),
-            label(20, 30, f"step {step}: gap {gap:.2f} mm, lift-off {-x[lift]:.2f} mm before the face"),
+            label(20, 30, f"step {step}: measured gap {gap:.2f} mm, lift-off {-x[lift]:.2f} mm before the face"),
             label(px(-4), py(radius + height - 3), "path of the axle", "#0550ae")]
     panels = ((690, "preload", "N", "preload_n", "preload_ref_n"),
               (900, "speed", "mm/s", "wheel_speed_mm_s", "speed_ref_mm_s"))
@@ -121,7 +114,7 @@ def main():
     svg += [label(20, 1102, "dashed: reference, face (grey), lift-off (red); distance before the face "
                             "from -20 to 8 mm", size=18), "</svg>", ""]
     pathlib.Path(out).write_text("\n".join(svg), encoding="utf-8")
-    print(f"{out}: gap {gap:.3f} mm at {log['wheel_speed_mm_s'][lift]:.2f} mm/s "
+    print(f"{out}: measured gap {gap:.3f} mm at {log['wheel_speed_mm_s'][lift]:.2f} mm/s "
           f"and {log['preload_n'][lift]:.1f} N")
 
 

@@ -122,19 +122,17 @@ impl Verb {
 pub fn main() -> ExitCode {
     let arguments: Vec<OsString> = std::env::args_os().skip(1).collect();
     if let Some(verb) = helped_elsewhere(&arguments) {
-        return match provision::go_on_with(Extra::Study, [verb.into(), "--help".into()]) {
-            Ok(code) => ExitCode::from(code),
-            Err(error) => failed(&error.into()),
-        };
+        return provision::help(Extra::Study, verb);
     }
     run(|cli: &Cli| cli.verb.run())
 }
 
-/// The verb of `help VERB`, if another part of `rig` has it and knows its options.
+/// The verb whose help is asked for, if another part of `rig` has it and knows its options.
 fn helped_elsewhere(arguments: &[OsString]) -> Option<&'static str> {
-    let [help, verb] = arguments else { return None };
-    let verb = ["modes", "bench", "paper"].into_iter().find(|known| verb == known)?;
-    (help == "help").then_some(verb)
+    let is_help = |word: &OsString| ["help", "--help", "-h"].iter().any(|help| word == help);
+    let mut verbs = ["modes", "bench", "paper"].into_iter();
+    let verb = verbs.find(|verb| arguments.iter().take(2).any(|word| word == verb))?;
+    arguments.iter().any(is_help).then_some(verb)
 }
 
 /// Prints why a verb could not do its work.

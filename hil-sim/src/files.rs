@@ -76,6 +76,12 @@ pub fn write_text(path: &Path, text: &str) -> Result<(), FileError> {
     atomic_write(path, |out| Ok(out.write_all(text.as_bytes())?))
 }
 
+/// Whether both paths lead to one file that is there.
+pub(crate) fn is_one_file(a: &Path, b: &Path) -> bool {
+    let [a, b] = [a, b].map(|path| path.canonicalize().ok());
+    a.is_some() && a == b
+}
+
 /// Makes `directory` and those above it.
 pub(crate) fn make_directory(directory: &Path) -> Result<(), FileError> {
     let what = "cannot make the directory";

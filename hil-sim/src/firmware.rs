@@ -174,12 +174,12 @@ pub(crate) fn executable(
     what: &str,
     binary: &str,
 ) -> Result<PathBuf, FirmwareError> {
-    let built = building::run(cargo, what).map_err(|source| could_not_start(cargo, source))?;
-    if !built.status.success() {
-        return Err(FirmwareError::Build(binary.to_owned(), built.status));
+    let (status, messages) =
+        building::run(cargo, what).map_err(|source| could_not_start(cargo, source))?;
+    if !status.success() {
+        return Err(FirmwareError::Build(binary.to_owned(), status));
     }
-    named(&String::from_utf8_lossy(&built.stdout), binary)
-        .ok_or_else(|| FirmwareError::NoExecutable(binary.to_owned()))
+    named(&messages, binary).ok_or_else(|| FirmwareError::NoExecutable(binary.to_owned()))
 }
 
 /// The binary's path from cargo's messages, one JSON object a line.

@@ -18,6 +18,10 @@ pub enum IdentifyError {
     /// The log of this name cannot be used, and why.
     #[error("{0}: {1}")]
     Log(String, String),
+    /// The log of this name is of another rig than the rest, and by how many deviations a
+    /// coordinate it disagrees.
+    #[error("{0}: not of the rig of the other logs: by {1:.0} deviations it disagrees with them")]
+    Several(String, f64),
     /// The fit found nothing, and why.
     #[error("the fit did not settle: {0}")]
     NoFit(String),

@@ -37,17 +37,6 @@ impl Progress {
         self.0.inc(count);
     }
 
-    /// So many items of so many are done.
-    pub fn reach(&self, done: u64, all: u64) {
-        self.0.set_length(all);
-        self.0.set_position(done);
-    }
-
-    /// Items that are done, and all of them.
-    pub fn position(&self) -> (u64, u64) {
-        (self.0.position(), self.0.length().unwrap_or(0))
-    }
-
     /// Shows what is being done.
     pub fn say(&self, what: &str) {
         self.0.set_message(what.to_owned());

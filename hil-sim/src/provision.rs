@@ -8,9 +8,8 @@
 mod tools;
 
 use std::env;
-use std::ffi::OsString;
 use std::path::PathBuf;
-use std::process::Command;
+use std::process::{Command, ExitCode};
 
 use crate::firmware::{self, FirmwareError};
 
@@ -70,16 +69,27 @@ pub fn featured(extra: Extra) -> Result<PathBuf, ProvisionError> {
 /// Runs that part of `rig`, built first if need be, with the arguments of this process, and
 /// returns its exit code. Standard output is its own.
 pub(crate) fn go_on(extra: Extra) -> Result<u8, ProvisionError> {
-    go_on_with(extra, env::args_os().skip(1))
-}
-
-/// The same with these arguments.
-pub(crate) fn go_on_with(
-    extra: Extra,
-    arguments: impl IntoIterator<Item = OsString>,
-) -> Result<u8, ProvisionError> {
     let mut command = Command::new(featured(extra)?);
-    command.args(arguments);
+    command.args(env::args_os().skip(1));
     let status = command.status().map_err(|e| firmware::could_not_start(&command, e))?;
     Ok(firmware::exit_code(status))
+}
+
+/// Shows the options of a verb of that part, which is not built for it.
+pub(crate) fn help(extra: Extra, verb: &str) -> ExitCode {
+    let (what, binary, _) = extra.build();
+    let program = env::current_exe().unwrap_or_default().with_file_name(binary);
+    match Command::new(program.with_extension(env::consts::EXE_EXTENSION))
+        .args([verb, "--help"])
+        .status()
+    {
+        Ok(status) => ExitCode::from(firmware::exit_code(status)),
+        Err(_) => {
+            println!(
+                "Usage: cargo rig {verb} [ARGS]\n\nThe first `cargo rig {verb}` builds {what}; \
+                 then --help lists its options."
+            );
+            ExitCode::SUCCESS
+        }
+    }
 }

@@ -1,7 +1,7 @@
 //! The record of a run: one row a tick, events, the ledger of the crossings, a summary.
 //!
 //! [`tick`] lists the columns. [`Decoder`] and [`Run`] read the controller's binary log;
-//! [`Writer`] and [`write_all`] write MCAP, CSV and JSON, [`recording`] reads them.
+//! [`Writer`] and [`write_all`] write MCAP, CSV and JSON, [`recordings`] reads them.
 
 mod columns;
 mod csv_file;
@@ -28,9 +28,9 @@ pub use decoder::{Counts, Decoder, Item, Mark};
 pub use ledger::LedgerLine;
 pub use mcap_file::{FRAMES, Topic, messages, unwrapped, write_mcap};
 pub use probed::Probed;
-pub use read::{ReadError, pieces};
+pub use read::{ReadError, log_at, pieces};
 pub use recorder::{RunRecorder, text};
-pub use recording::recording;
+pub use recording::recordings;
 pub use run::{Boot, Cut, Header, Run, Since, Unknown};
 pub use source::{Bytes, Source, SourceError, Virtual, letter, starter};
 pub use summary::{CrossingLine, LogLine, Recording, Report, Summary};

@@ -20,9 +20,9 @@ mod tables;
 pub(crate) mod verdict;
 
 pub use beside::beside_svg;
-pub use compare::{Difference, compare_html, differences};
+pub use compare::{Difference, compare_html, differences, table as compared};
 pub(crate) use page::capital;
-pub use page::{Section, html, page_of};
+pub use page::{Section, html, log_html, page_of};
 pub use panels::overview_svg;
 pub(crate) use scene::Geometry;
 

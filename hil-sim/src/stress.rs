@@ -150,15 +150,16 @@ fn gather(ran: Vec<Ran>) -> StressReport {
                         let why = format!("{figure:?} at {value:.3} of its limit");
                         report.failed.push(StressFailure { why, case });
                     }
-                    figures.entry(figure).or_default().push((value, case));
+                    let worst = figures.entry(figure).or_default();
+                    worst.push((value, case));
+                    worst.sort_by(|a, b| b.0.total_cmp(&a.0));
+                    worst.truncate(LISTED);
                 }
             }
         }
     }
-    for (figure, mut values) in figures {
-        values.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let worst = values.into_iter().take(LISTED);
-        report.worst.extend(worst.map(|(value, case)| Worst { figure, value, case }));
+    for (figure, worst) in figures {
+        report.worst.extend(worst.into_iter().map(|(value, case)| Worst { figure, value, case }));
     }
     report
 }

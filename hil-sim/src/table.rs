@@ -33,5 +33,26 @@ fn cell(column: usize, text: String) -> Cell {
 /// `value` with `decimals`; a dash if it is missing or no number.
 pub fn number(value: impl Into<Option<f64>>, decimals: usize) -> String {
     let value = value.into().filter(|value| value.is_finite());
-    value.map_or_else(|| "-".to_owned(), |value| format!("{value:.decimals$}"))
+    value.map_or_else(|| "-".to_owned(), |value| label(value, decimals))
+}
+
+/// `value` with `decimals`, without a negative zero.
+pub fn label(value: f64, decimals: usize) -> String {
+    let text = format!("{value:.decimals$}");
+    if text.trim_start_matches(['-', '0', '.']).is_empty() {
+        text.trim_start_matches('-').to_owned()
+    } else {
+        text
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nothing_is_minus_zero() {
+        let shown = [-0.0, -0.004, -0.006, 0.0, f64::NAN].map(|value| number(value, 2));
+        assert_eq!(shown, ["0.00", "0.00", "-0.01", "0.00", "-"]);
+    }
 }

@@ -28,6 +28,8 @@ use trace::Trace;
 const LONGEST_S: f64 = 120.0;
 /// Time for which the board runs on after arrival, ms.
 const AFTER: u32 = 100;
+/// The same after a restart under way, s: it reports the cause and is idle again.
+const AFTER_RESTART_S: f64 = 1.0;
 
 /// A finished run.
 pub struct Ran {
@@ -110,12 +112,14 @@ pub fn run_with(
     let mut gathered = Gathered::default();
     let mut stream = Vec::new();
     let mut faults = options.faults.clone();
-    while bench.time_s() < LONGEST_S && after > 0 {
+    let mut ends_at = LONGEST_S;
+    while bench.time_s() < ends_at && after > 0 {
         let now = bench.time_s();
         for due in faults.extract_if(.., |due| due.at_s <= now) {
             due.fault.strike(bench.machine_mut())?;
         }
         let waited = bench.waits_to_start();
+        let restarts = bench.machine().restarts().len();
         let (_, lines) = bench.step()?;
         for line in &lines {
             watch(bench.time_s(), line);
@@ -126,7 +130,12 @@ pub fn run_with(
             gathered.gather(bench.machine_mut());
         }
         let frames = bench.take_frames();
-        trace.add(&frames, &lines, bench.plant().truth());
+        let restarted = bench.machine().restarts().len() > restarts;
+        if restarted && !waited {
+            // It starts with the drive at rest and waits for a command.
+            ends_at = ends_at.min(bench.time_s() + AFTER_RESTART_S);
+        }
+        trace.add(&frames, &lines, bench.plant().truth(), restarted);
         stream.extend(frames);
         if trace.is_over() {
             after -= 1;
@@ -135,6 +144,8 @@ pub fn run_with(
     let wall_s = started.elapsed().as_secs_f64();
     let mut recording = trace.finish(scenario, bench.plant(), options.rows, wall_s);
     recording.stream = stream;
+    let injected = options.faults.iter().map(|due| format!("{} at {} s", due.fault, due.at_s));
+    recording.summary.injected.extend(injected);
     let machine = bench.into_machine();
     let stack = stack_used(&machine)?;
     let load = gathered.close(&machine, &footprint, stack);

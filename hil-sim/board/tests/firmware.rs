@@ -11,7 +11,7 @@ use rig_board::chip::Pin;
 use rig_board::core::{Access, Bus};
 use rig_board::faults::Fault;
 use rig_board::peripherals::rcc::Cause;
-use rig_board::run::{self, Ran};
+use rig_board::run::{self, Ran, RunOptions};
 
 use crate::common::{Board, elf, scenario};
 
@@ -166,6 +166,27 @@ fn other_rigs_run_on_the_board_as_in_software() {
         let board = run::run(elf(), &scenario(&sets), false, |_, _| {}).expect("a run");
         assert_alike(&board.recording, &scenario(&sets));
     }
+}
+
+/// A board that restarts under way waits for a command: the run ends there, says why, and shows the
+/// second start at its own time.
+#[test]
+fn a_restart_under_way_ends_the_run_with_its_cause() {
+    let faults = vec!["supply-dip@2".parse().expect("a fault")];
+    let options = RunOptions { rows: true, faults, ..RunOptions::default() };
+    let ran = run::run_with(elf(), &scenario(&[]), &options, |_, _| {}).expect("a run");
+    let (summary, rows) = (&ran.recording.summary, &ran.recording.rows);
+    assert!(!summary.completed && summary.total_s < 4.0, "{}", summary.total_s);
+    let cause = summary.restart.as_deref().expect("it is reported");
+    assert!(cause.contains("supply") && cause.contains("before: "), "{cause}");
+    assert_eq!(summary.injected, ["supply-dip at 2 s"]);
+    let known: Vec<f64> = rows.iter().map(|row| row.controller.t_s).collect();
+    let falls = known.windows(2).filter(|pair| pair[1] < pair[0]).count();
+    assert_eq!(falls, 0, "the time of a row never goes back");
+    // The second start has ticks, each within a frame's time of its row.
+    let late = rows.iter().enumerate().skip(2500).filter(|(_, row)| row.controller.preload_n > 0.0);
+    let late: Vec<f64> = late.map(|(n, row)| row.controller.t_s - n as f64 * 1e-3).collect();
+    assert!(late.len() > 300 && late.iter().all(|off| off.abs() < 0.003), "{late:?}");
 }
 
 #[test]

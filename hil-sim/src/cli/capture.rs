@@ -6,6 +6,7 @@ use std::time::Instant;
 use super::failure::{Failure, Outcome};
 use super::log_files::{LogFiles, Stop};
 use super::output::{self, WithFiles};
+use super::parse::seconds;
 use super::source::SourceArgs;
 use crate::progress;
 use crate::record::{Source, View};
@@ -35,7 +36,7 @@ pub struct Args {
     bare: bool,
 
     /// Ends after so many seconds of this host's time.
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = seconds)]
     seconds: Option<f64>,
 
     /// Prints what came as one JSON object.

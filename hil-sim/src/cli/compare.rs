@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 
 use super::failure::{Failure, Outcome};
 use super::output;
-use super::scenario::RunArgs;
+use super::scenario::{RunArgs, seeds_fit};
 use crate::compare::{self, Comparison, Entry};
 use crate::oracle::Effort;
 use crate::progress;
@@ -17,11 +17,12 @@ use crate::table::{number, plain};
 /// The reserve below the reference gap of each is tuned until its worst gap over all rigs is
 /// the reference; then the times are comparable. The oracle knows each plant in advance and
 /// has the same actuators; it keeps the worst gap and the least slip margin of the scheduled
-/// run on that plant.
+/// run on that plant. A rig takes about 5 s of one core with the oracle, 0.2 s without.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
     /// How many rigs: the seeds that follow --seed.
     #[arg(short = 'n', value_name = "N", default_value_t = 20,
+          allow_negative_numbers = true,
           value_parser = clap::value_parser!(u64).range(1..=100_000))]
     count: u64,
 
@@ -38,7 +39,9 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
+    args.run.no_controller("every strategy is compared")?;
     let scenario = args.run.resolve()?;
+    seeds_fit(&scenario, args.count)?;
     let rigs = args.count as usize;
     let mut comparison = {
         let bar = progress::bar("runs at most", compare::most_runs(rigs) as u64);

@@ -59,6 +59,10 @@ pub struct Args {
     #[arg(long, conflicts_with = "out")]
     no_files: bool,
 
+    /// Every column of the table of crossings.
+    #[arg(short, long)]
+    pub verbose: bool,
+
     /// Prints the summary as one JSON object.
     #[arg(long)]
     pub json: bool,
@@ -108,7 +112,7 @@ pub(crate) fn conclude(
     };
     let summary = &recording.summary;
     let printed = WithFiles { result: summary, files: &files };
-    output::result(args.json, &printed, || terminal::run(summary, &files))?;
+    output::result(args.json, &printed, || terminal::run(summary, &files, args.verbose))?;
     Ok(Outcome::of(summary.completed && summary.faults.is_empty()))
 }
 

@@ -22,6 +22,7 @@ pub struct Args {
 
     /// Instants a fault.
     #[arg(short = 'n', value_name = "N", default_value_t = 20,
+          allow_negative_numbers = true,
           value_parser = clap::value_parser!(u64).range(1..=100_000))]
     count: u64,
 
@@ -65,7 +66,8 @@ impl Args {
             return Err(Failure::input(format!("--only {text}: no such fault; faults: {names}")));
         }
         let cases = (0..).zip(wanted).filter(|(index, _)| self.shard.has(*index));
-        let cases = cases.map(|(_, case)| case).collect();
+        let cases: Vec<Case> = cases.map(|(_, case)| case).collect();
+        montecarlo::shard_has(self.shard, cases.len())?;
         Ok(Campaign { scenario: self.scenario.resolve()?, instants: self.count as usize, cases })
     }
 }

@@ -18,8 +18,8 @@ use crate::{files, progress};
 /// Identifies a rig's parameters from its logs, with 95 % intervals.
 ///
 /// Several logs of one rig give narrower intervals: a scheduled deployment and two at constant
-/// preloads, one light, one heavy. Writes a scenario file with what was identified and a
-/// picture of the residuals of each log.
+/// preloads, one light, one heavy; logs of several rigs are refused. Writes a scenario file with what was identified and a
+/// picture of the residuals of each log. The exit code is 1 if a part of a log is missing.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
     /// Logs of deployments: log.mcap, or log.csv with its metadata beside it.
@@ -44,7 +44,7 @@ pub(super) struct Args {
 
     /// Directory of the parameter file and the pictures; by default out/identify, with a number
     /// if that has another result.
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", conflicts_with = "published")]
     out: Option<PathBuf>,
 
     /// Prints the result as one JSON object.
@@ -55,7 +55,7 @@ pub(super) struct Args {
 impl From<IdentifyError> for Failure {
     fn from(error: IdentifyError) -> Self {
         match error {
-            IdentifyError::Log { .. } => Self::input(error),
+            IdentifyError::Log { .. } | IdentifyError::Several { .. } => Self::input(error),
             IdentifyError::NoFit { .. } => Self::run(error),
         }
     }
@@ -85,7 +85,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
 fn print(args: &Args, found: &Identification, files: &[PathBuf]) -> Result<Outcome, Failure> {
     let printed = WithFiles { result: found, files };
     output::result(args.json, &printed, || human(found) + &output::wrote(files))?;
-    Ok(Outcome::Good)
+    Ok(Outcome::of(found.is_complete))
 }
 
 /// The parameter file, and the directory where none is asked for.
@@ -202,6 +202,7 @@ fn by_published(args: &Args, scenario: &Scenario) -> Result<Outcome, Failure> {
             of_tread("with the scenario's stiffening held", &held),
             of_tread("the scenario's tread", &stated),
         ],
+        is_complete: true,
         scenario: scenario.clone(),
     };
     print(args, &found, &[])

@@ -7,10 +7,13 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use interstage::log::identity::fingerprint;
+use serde_json::{Value, json};
 
 use super::failure::Failure;
 use crate::files::make_directory;
-use crate::record::{Counts, Header, Item, Metadata, WriteError, Writer, write_metadata};
+use crate::record::{
+    Counts, Header, Item, Metadata, WriteError, Writer, recordings, write_metadata,
+};
 use crate::scenario::Scenario;
 
 /// Ctrl-C as a request to end with complete files.
@@ -60,8 +63,8 @@ impl LogFiles {
         bare: bool,
         scenario: &Scenario,
     ) -> Result<Self, Failure> {
-        make_directory(folder)?;
         let name = free_name(folder, name)?;
+        make_directory(folder)?;
         let mcap = folder.join(format!("{name}.mcap"));
         let csv = (!bare).then(|| folder.join(format!("{name}.csv")));
         let table = csv.as_deref().map(created).transpose()?;
@@ -118,7 +121,7 @@ impl LogFiles {
         let metadata = Metadata {
             header: self.header.clone(),
             parameters: self.parameters.clone(),
-            ticks: None,
+            ..Metadata::default()
         };
         self.csv.as_ref().map_or(Ok(()), |csv| {
             write_metadata(csv, &metadata, false)?;
@@ -143,7 +146,12 @@ impl LogFiles {
     ) -> Result<(Counts, Vec<PathBuf>), Failure> {
         let Self { writer, folder, mcap, csv, header, parameters, .. } = self;
         let counts = writer.finish(see).map_err(|error| failed(&folder, error))?;
-        let metadata = Metadata { header, parameters, ticks: Some(counts.ticks) };
+        let starts = csv.as_ref().and_then(|_| recordings(&mcap).ok()).unwrap_or_default();
+        let crossings = match &starts[..] {
+            [start] => json!(start.summary.crossings),
+            _ => Value::Null,
+        };
+        let metadata = Metadata { header, parameters, ticks: Some(counts.ticks), crossings };
         let described =
             csv.as_ref().map(|csv| write_metadata(csv, &metadata, false)).transpose()?;
         Ok((counts, [Some(mcap), csv, described].into_iter().flatten().collect()))
@@ -160,7 +168,11 @@ fn free_name(folder: &Path, asked: Option<&str>) -> Result<String, Failure> {
         let all = ["mcap", "csv"].map(|ending| folder.join(format!("{name}.{ending}")));
         all.into_iter().find(|path| path.exists())
     };
+    let is_plain = |name: &str| Path::new(name).file_name().is_some_and(|file| file == name);
     match asked {
+        Some(name) if !is_plain(name) => {
+            Err(Failure::input(format!("--name {name}: a name without a folder is expected")))
+        }
         Some(name) => match taken(name) {
             Some(path) => {
                 let path = path.display();

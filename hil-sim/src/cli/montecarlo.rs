@@ -2,7 +2,7 @@
 
 use super::failure::{Failure, Outcome};
 use super::output;
-use super::scenario::RunArgs;
+use super::scenario::{RunArgs, seeds_fit};
 use crate::montecarlo::{self, Least, Quantiles, Shard};
 use crate::progress;
 use crate::scenario::{MismatchDraw, Scenario};
@@ -21,6 +21,7 @@ use crate::table::{number, plain};
 pub(super) struct Args {
     /// How many: the seeds that follow --seed.
     #[arg(short = 'n', value_name = "N", default_value_t = 100,
+          allow_negative_numbers = true,
           value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     count: u64,
 
@@ -56,13 +57,24 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     Ok(Outcome::of(sound))
 }
 
+/// Refuses a part of a campaign in which nothing is left to run.
+pub(super) fn shard_has(shard: Shard, items: usize) -> Result<(), Failure> {
+    if items == 0 {
+        let why = "the campaign has fewer runs than parts, and none for this one";
+        return Err(Failure::input(format!("--shard {shard}: {why}")));
+    }
+    Ok(())
+}
+
 /// Runs this part of `count` rigs, with a progress bar.
 pub(super) fn campaign(
     scenario: &Scenario,
     shard: Shard,
     count: u64,
 ) -> Result<montecarlo::Outcome, Failure> {
+    seeds_fit(scenario, count)?;
     let seeds = shard.seeds(scenario.run.seed, count);
+    shard_has(shard, seeds.len())?;
     let bar = progress::bar("runs", seeds.len() as u64);
     let lines = montecarlo::run(scenario, &seeds, &|| bar.advance(1))?;
     Ok(montecarlo::Outcome::of(&lines).drawn_from(scenario, &seeds))

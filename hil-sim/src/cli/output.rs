@@ -1,11 +1,12 @@
 //! Results on standard output.
 
 use std::io::{self, ErrorKind, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
 use super::failure::Failure;
+use crate::files::is_one_file;
 
 /// A result with the files that were written, as `--json` prints both.
 #[derive(Serialize)]
@@ -29,9 +30,27 @@ pub fn result(
     }
 }
 
-/// The files that were written, a line each. Paths are not wrapped, so that they can be copied.
+/// The files that were written: a line a file, or one for a folder. Paths are not wrapped, so that
+/// they can be copied.
 pub fn wrote(files: &[PathBuf]) -> String {
+    let folder = files.first().and_then(|file| file.parent()).filter(|_| files.len() > 1);
+    if let Some(folder) = folder
+        && files.iter().all(|file| file.parent() == Some(folder))
+    {
+        let names = files.iter().filter_map(|file| file.file_name()).map(|n| n.to_string_lossy());
+        let names: Vec<_> = names.collect();
+        return format!("  wrote {}/: {}\n", folder.display(), names.join(", "));
+    }
     files.iter().map(|file| format!("  wrote {}\n", file.display())).collect()
+}
+
+/// Refuses to write the file that the option or argument `name` gives over one that is read.
+pub(super) fn spare(name: &str, to: &Path, inputs: &[&Path]) -> Result<(), Failure> {
+    if inputs.iter().any(|input| is_one_file(input, to)) {
+        let to = to.display();
+        return Err(Failure::input(format!("{name} {to}: is read by this command: name another")));
+    }
+    Ok(())
 }
 
 /// Prints `text`. A reader that closes the pipe early is no error.

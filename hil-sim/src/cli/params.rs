@@ -147,6 +147,7 @@ pub fn act(args: &Args, store: &mut impl Store) -> Result<Outcome, Failure> {
             replace(args, store, &scenario, &new, name)
         }
         Action::Save { to } => {
+            output::spare("save", to, &[args.file.as_deref().unwrap_or(&args.flash)])?;
             write_text(to, &scenario.to_toml())?;
             show(args, &held, false, &[], None)
         }

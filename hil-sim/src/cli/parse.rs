@@ -20,6 +20,12 @@ pub(super) fn report(error: &clap::Error) -> ExitCode {
     ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2))
 }
 
+/// Reads a duration, s.
+pub(super) fn seconds(text: &str) -> Result<f64, &'static str> {
+    let read = text.parse().ok().filter(|s: &f64| s.is_finite() && *s > 0.0);
+    read.ok_or("expected seconds, a number above 0")
+}
+
 /// The error as one line, without usage and without the pointer to the help.
 fn line(text: &str) -> String {
     let said = text.split("\n\n").filter(|paragraph| {

@@ -8,17 +8,18 @@ use super::failure::{Failure, Outcome};
 use super::output::{self, WithFiles};
 use super::terminal;
 use crate::files::{make_directory, vacant_for, write_text};
-use crate::record::{Recording, recording};
-use crate::report::{Difference, beside_svg, compare_html, differences, html};
-use crate::table;
+use crate::record::{Recording, Summary, log_at, recordings};
+use crate::report::{Difference, beside_svg, compare_html, compared, differences, log_html};
+use crate::table::plain;
 
 /// The page of a log as `deploy` writes it, or of two logs crossing by crossing.
 ///
 /// A log of the virtual rig contains the truth; a captured one shows what the controller
-/// measured. The exit code is 1 if a part of a log is missing.
+/// measured, in a section for each start of the controller. The exit code is 1 if a part of a log
+/// is missing.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
-    /// The log: MCAP, or bytes of the binary channel.
+    /// The log: MCAP, bytes of the binary channel, or the folder of a run.
     #[arg(value_name = "LOG")]
     log: PathBuf,
 
@@ -34,52 +35,86 @@ pub(super) struct Args {
     #[arg(long, value_name = "FILE", requires = "other")]
     picture: Option<PathBuf>,
 
+    /// Every column of the table of crossings.
+    #[arg(short, long)]
+    verbose: bool,
+
     /// Prints the ledger or the differences as one JSON object.
     #[arg(long)]
     json: bool,
 }
 
 pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
-    let first = recording(&args.log).map_err(Failure::input)?;
-    match &args.other {
-        None => one(args, &first),
-        Some(other) => two(args, &first, other),
+    let log = log_at(&args.log);
+    let other = args.other.as_deref().map(log_at);
+    let inputs: Vec<&Path> = [Some(&*log), other.as_deref()].into_iter().flatten().collect();
+    for (name, to) in [("--out", &args.out), ("--picture", &args.picture)] {
+        to.as_ref().map_or(Ok(()), |to| output::spare(name, to, &inputs))?;
+    }
+    let boots = recordings(&log).map_err(Failure::input)?;
+    match &other {
+        None => one(args, &log, &boots),
+        Some(other) => two(args, (&log, &boots), other),
     }
 }
 
 /// Where a page with this text goes: beside the first log a page of another content is kept.
-fn page(args: &Args, ending: &str, text: &str) -> Result<PathBuf, Failure> {
-    let beside = || vacant_for(&args.log.with_extension(ending), text);
-    let page = args.out.clone().unwrap_or_else(beside);
-    if let Some(directory) = page.parent().filter(|directory| !directory.as_os_str().is_empty()) {
-        make_directory(directory)?;
-    }
+fn page(args: &Args, log: &Path, ending: &str, text: &str) -> Result<PathBuf, Failure> {
+    let page = args.out.clone().unwrap_or_else(|| vacant_for(&log.with_extension(ending), text));
+    page.parent().map_or(Ok(()), make_directory)?;
+    write_text(&page, text)?;
     Ok(page)
 }
 
-fn one(args: &Args, recording: &Recording) -> Result<Outcome, Failure> {
-    let text = html(recording, &[]);
-    let files = [page(args, "html", &text)?];
-    write_text(&files[0], &text)?;
-    let printed = WithFiles { result: &recording.summary, files: &files };
-    output::result(args.json, &printed, || terminal::run(&recording.summary, &files))?;
-    Ok(Outcome::of(recording.summary.missing.is_empty()))
+fn one(args: &Args, log: &Path, boots: &[Recording]) -> Result<Outcome, Failure> {
+    let files = [page(args, log, "html", &log_html(boots))?];
+    let human = || {
+        let one = |(n, boot): (usize, &Recording)| {
+            let text = terminal::run(&boot.summary, &[], args.verbose);
+            format!("start {} of {}: {text}", n + 1, boots.len())
+        };
+        boots.iter().enumerate().map(one).collect::<String>() + &output::wrote(&files)
+    };
+    match boots {
+        [boot] => {
+            let printed = WithFiles { result: &boot.summary, files: &files };
+            output::result(args.json, &printed, || {
+                terminal::run(&boot.summary, &files, args.verbose)
+            })?;
+        }
+        _ => {
+            let summaries: Vec<&Summary> = boots.iter().map(|boot| &boot.summary).collect();
+            output::result(args.json, &json!({ "starts": summaries, "files": files }), human)?;
+        }
+    }
+    Ok(Outcome::of(boots.iter().all(|boot| boot.summary.missing.is_empty())))
 }
 
-fn two(args: &Args, first: &Recording, path: &Path) -> Result<Outcome, Failure> {
-    let second = recording(path).map_err(Failure::input)?;
-    let names = (args.log.display().to_string(), path.display().to_string());
-    let text = compare_html((&names.0, first), (&names.1, &second));
-    let mut files = vec![page(args, "compare.html", &text)?];
-    write_text(&files[0], &text)?;
+/// The one recording of a log that is compared.
+fn only<'a>(log: &Path, boots: &'a [Recording]) -> Result<&'a Recording, Failure> {
+    if let [boot] = boots {
+        return Ok(boot);
+    }
+    let (log, starts) = (log.display(), boots.len());
+    Err(Failure::input(format!(
+        "{log}: {starts} starts of the controller, where one is compared; `rig report {log}` shows each"
+    )))
+}
+
+fn two(args: &Args, (log, boots): (&Path, &[Recording]), path: &Path) -> Result<Outcome, Failure> {
+    let others = recordings(path).map_err(Failure::input)?;
+    let (first, second) = (only(log, boots)?, only(path, &others)?);
+    let names = (log.display().to_string(), path.display().to_string());
+    let text = compare_html((&names.0, first), (&names.1, second));
+    let mut files = vec![page(args, log, "compare.html", &text)?];
     if let Some(picture) = &args.picture {
-        let [a, b] = titles([(&names.0, first), (&names.1, &second)]);
-        write_text(picture, &beside_svg([(&a, first), (&b, &second)]))?;
+        let [a, b] = titles([(&names.0, first), (&names.1, second)]);
+        write_text(picture, &beside_svg([(&a, first), (&b, second)]))?;
         files.push(picture.clone());
     }
-    let differences = differences(first, &second);
+    let differences = differences(first, second);
     let printed = json!({ "differences": differences, "files": files });
-    let missing = [(&names.0, first), (&names.1, &second)].map(|(name, log)| {
+    let missing = [(&names.0, first), (&names.1, second)].map(|(name, log)| {
         let lines = log.summary.missing.iter();
         lines.map(|what| format!("  {name}: incomplete log: {what}\n")).collect::<String>()
     });
@@ -101,10 +136,7 @@ fn titles(runs: [(&String, &Recording); 2]) -> [String; 2] {
 }
 
 fn human(differences: &[Difference]) -> String {
-    let rows = differences.iter().map(|difference| {
-        let Difference { index, quantity, unit, decimals, a, b, change } = difference;
-        let value = |value: &Option<f64>| table::number(*value, *decimals);
-        vec![format!("{index}"), format!("{quantity}, {unit}"), value(a), value(b), value(change)]
-    });
-    format!("{}\n", table::plain(&["step", "quantity", "A", "B", "B - A"], rows))
+    let (head, rows) = compared(differences);
+    let head: Vec<&str> = head.iter().map(String::as_str).collect();
+    format!("{}\n", plain(&head, rows))
 }

@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use super::failure::{Failure, Outcome};
 use super::output;
+use super::scenario::seed;
 use crate::progress;
 use crate::stress::{self, StressReport};
 use crate::table::plain;
@@ -17,11 +18,13 @@ use crate::table::plain;
 pub(super) struct Args {
     /// Cases, without those that must be refused.
     #[arg(short = 'n', long = "cases", value_name = "CASES", default_value_t = 10_000,
-          value_parser = clap::value_parser!(u64).range(1..))]
+          allow_negative_numbers = true,
+          value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     cases: u64,
 
     /// Seed of the cases between the corners.
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true,
+          value_parser = seed)]
     seed: u64,
 
     /// Prints the result as one JSON object.

@@ -25,7 +25,8 @@ const PRELOAD: &str = "preload_n";
 /// grid of several: table, CSV and picture.
 ///
 /// A deployment gives its worst gap, duration and slip. With --crossing the rows are crossings
-/// at constant speed and preload, which are keys there: speed_mm_s and preload_n.
+/// at constant speed and preload, which are keys there: speed_mm_s and preload_n. A row takes
+/// some hundredths of a second of one core.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
     /// A key and its values, may be repeated: KEY=LOW..HIGH:COUNT, evenly; LOW..HIGH:COUNTlog,
@@ -71,6 +72,9 @@ struct Measure {
 }
 
 pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
+    if args.crossing {
+        args.run.no_controller("speed and preload of a crossing are given")?;
+    }
     let base = args.run.resolve()?;
     let axes = axes(args, &base)?;
     let places = sweep::places(&axes);

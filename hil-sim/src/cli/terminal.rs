@@ -7,20 +7,24 @@ use comfy_table::Table;
 
 use super::output::wrote;
 use crate::record::{CrossingLine, Report, Summary};
-use crate::report::ledger::{COLUMNS, limited_by};
-use crate::report::verdict::{Grade, gap_sentence, headline, origin, reservations, slip_sentence};
-use crate::table::{WIDTH, number, plain};
+use crate::report::ledger::{COLUMNS, slowed_by};
+use crate::report::verdict::{Grade, gap_sentence, headline, origin, slip_sentence, verdict};
+use crate::table::{number, plain};
 
-/// The run of `summary` as text, with the paths of `files` at the end. Ends with a
-/// line feed.
-pub fn run(summary: &Summary, files: &[PathBuf]) -> String {
+/// Most columns of a run's text, and of its table with every column.
+const WIDTH: u16 = 80;
+const WIDE: u16 = 160;
+
+/// The run of `summary` as text, with the paths of `files` at the end; `all` columns of the
+/// crossings or those that matter most. Ends with a line feed.
+pub fn run(summary: &Summary, files: &[PathBuf], all: bool) -> String {
     let mut text = painted(&wrapped(&headline(summary), ""), Grade::of(summary), is_coloured());
     for missing in &summary.missing {
         text += &wrapped(&format!("incomplete log: {missing}"), "  ");
     }
     text += &wrapped(&details(summary), "  ");
     if !summary.crossings.is_empty() {
-        text += &format!("{}\n", ledger(&summary.crossings));
+        text += &format!("{}\n", ledger(&summary.crossings, all));
     }
     if let Some(lost) = &summary.lost {
         text += &wrapped(&lost.sentence(), "  ");
@@ -50,27 +54,29 @@ fn painted(text: &str, grade: Grade, is_coloured: bool) -> String {
 }
 
 fn details(s: &Summary) -> String {
-    let mut parts: Vec<String> = reservations(s).into_iter().map(str::to_owned).collect();
-    parts.extend([gap_sentence(s), slip_sentence(s), origin(s)]);
+    let mut parts = vec![verdict(s), gap_sentence(s), slip_sentence(s), origin(s)];
+    parts.retain(|part| !part.is_empty());
     if !s.measured {
         parts.push(format!("{:.0} times real time", s.real_time_factor));
     }
     parts.join("; ")
 }
 
-fn ledger(crossings: &[CrossingLine]) -> Table {
-    let columns = || COLUMNS.iter().filter(|column| column.on_terminal);
+fn ledger(crossings: &[CrossingLine], all: bool) -> Table {
+    let columns = || COLUMNS.iter().filter(|column| all || column.on_terminal);
     let names: Vec<String> = columns().map(|c| format!("{}\n{}", c.name, c.unit)).collect();
     let head: Vec<&str> = std::iter::once("step")
         .chain(names.iter().map(String::as_str))
-        .chain(["limited\nby"])
+        .chain(["slowed\nby"])
         .collect();
     let rows = crossings.iter().map(|line| {
         let cells = columns().map(|column| number((column.of)(line), column.decimals));
-        let by = limited_by(line).to_owned();
+        let by = slowed_by(line).to_owned();
         std::iter::once(line.index.to_string()).chain(cells).chain([by]).collect()
     });
-    plain(&head, rows)
+    let mut table = plain(&head, rows);
+    table.set_width(if all { WIDE } else { WIDTH });
+    table
 }
 
 fn report_line(kind: &str, report: &Report) -> String {
@@ -103,7 +109,7 @@ mod tests {
     #[test]
     fn nothing_is_wider_than_the_terminal() {
         for recording in [example::deploy(), example::faulted()] {
-            let text = run(&recording.summary, &[]);
+            let text = run(&recording.summary, &[], false);
             for line in text.lines() {
                 assert!(line.chars().count() <= usize::from(WIDTH), "{line}");
             }
@@ -113,7 +119,7 @@ mod tests {
     #[test]
     fn a_ledger_line_takes_one_line_of_text() {
         let summary = example::deploy().summary;
-        let text = run(&summary, &[PathBuf::from("out/run/report.html")]);
+        let text = run(&summary, &[PathBuf::from("out/run/report.html")], false);
         let c = &summary.crossings[1];
         // By its number: a gap may equal another crossing's prediction.
         let number = c.index.to_string();
@@ -123,8 +129,18 @@ mod tests {
         assert!(line.contains(&format!(" {:.3} ", c.gap_mm)), "{line}");
         assert!(line.contains(&format!(" {:.2} ", c.step_mm)), "{line}");
         assert!(line.contains(" - "), "the missing measurement is shown: {line}");
-        assert!(text.contains(" predicted "), "no heading is broken: {text}");
+        assert!(text.contains(" measured "), "no heading is broken: {text}");
+        let words = ["preload limit", "slow preload"];
+        assert!(words.iter().any(|words| line.contains(words)), "{line}");
+        assert!(!text.contains(" predicted ") && run(&summary, &[], true).contains(" predicted "));
         assert!(text.ends_with("  wrote out/run/report.html\n"));
+    }
+
+    #[test]
+    fn files_of_one_folder_take_one_line() {
+        let files = ["report.html", "log.csv"].map(|name| PathBuf::from("out/run").join(name));
+        let text = run(&example::deploy().summary, &files, false);
+        assert!(text.ends_with("  wrote out/run/: report.html, log.csv\n"), "{text}");
     }
 
     #[test]
@@ -137,7 +153,7 @@ mod tests {
 
     #[test]
     fn faults_and_limits_are_listed() {
-        let text = run(&example::faulted().summary, &[]);
+        let text = run(&example::faulted().summary, &[], false);
         assert!(text.starts_with("Did not complete: fault 121"));
         assert!(text.contains("  fault 121 at "));
         assert!(text.contains("  limit 201 at "));

@@ -16,9 +16,7 @@ use super::noise::Noise;
 use super::record::{Record, Sample, TICK_S};
 
 /// Dead time, ms.
-/// Dead time, ms.
 pub(crate) const DELAY: usize = 0;
-/// Logarithm of the lag, s.
 /// Logarithm of the lag, s.
 pub(crate) const LAG: usize = 1;
 /// Slew, N/s by the preload sensor.

@@ -54,6 +54,8 @@ pub struct Record {
     pub scenario: Scenario,
     /// One a tick, without gaps.
     pub samples: Vec<Sample>,
+    /// What is missing of the log, in sentences.
+    pub missing: Vec<String>,
 }
 
 impl Record {
@@ -84,7 +86,7 @@ impl Record {
             (row.tick, reader.sample(&row.sensors(), &driven))
         };
         let ticked: Vec<_> = run.rows.iter().map(sample).collect();
-        Self::new(&name, scenario, ticked)
+        Ok(Self { missing: run.missing(), ..Self::new(&name, scenario, ticked)? })
     }
 
     /// A record of samples with their ticks.
@@ -121,7 +123,7 @@ impl Record {
             samples.push(sample);
             last = Some(tick);
         }
-        Ok(Self { name: name.to_owned(), scenario, samples })
+        Ok(Self { name: name.to_owned(), scenario, samples, missing: Vec::new() })
     }
 
     /// Whether the wheel goes out, onto the smaller radius.

@@ -106,8 +106,10 @@ pub struct Identification {
     pub residuals: Vec<Residuals>,
     /// Values compared less parameters fitted.
     pub degrees_of_freedom: usize,
-    /// What the logs do not determine, in sentences.
+    /// What is missing of the logs, and what they do not determine, in sentences.
     pub notes: Vec<String>,
+    /// Whether nothing is missing of the logs.
+    pub is_complete: bool,
     /// The scenario with what was identified.
     #[serde(skip)]
     pub scenario: Scenario,
@@ -127,18 +129,25 @@ pub fn identify(records: &[Record], scenario: &Scenario) -> Result<Identificatio
     let runs: Vec<Run> =
         records.iter().map(|record| Run::of(record, &coordinates)).collect::<Result<_, _>>()?;
     let contact = contact::fit(&runs, &coordinates)?;
+    contact::agree(&runs, &coordinates, &contact)?;
     let actuator = actuator::fit(records, &runs, &contact.trajectories, contact.x[RADIUS])?;
     let report = Document { scenario, coordinates: &coordinates, runs: &runs, contact: &contact };
     let mut parameters = report.contact_parameters();
     parameters.extend(report.actuator_parameters(&actuator));
     parameters.extend(report.zeros());
+    let missing = |record: &Record| -> Vec<String> {
+        record.missing.iter().map(|what| format!("{}: {what}", record.name)).collect()
+    };
+    let missing: Vec<String> = records.iter().flat_map(missing).collect();
+    let is_complete = missing.is_empty();
     let compared = contact.residuals.iter().flatten().chain(&actuator.residuals).map(Vec::len);
     let fitted = contact.x.len() + actuator.x.len();
     Ok(Identification {
         scenario: updated(scenario, &parameters),
         residuals: report.residuals(&actuator),
         degrees_of_freedom: compared.sum::<usize>().saturating_sub(fitted),
-        notes: report.notes(&parameters),
+        notes: [missing, report.notes(&parameters)].concat(),
+        is_complete,
         parameters,
     })
 }
@@ -382,6 +391,7 @@ mod tests {
             residuals: Vec::new(),
             degrees_of_freedom: 1,
             notes: Vec::new(),
+            is_complete: true,
             scenario: after.clone(),
         };
         let read = Scenario::parse("identified.toml", &found.to_toml(), &[]).unwrap();

@@ -28,10 +28,7 @@ impl Shard {
     /// Every n-th of the `count` seeds that follow `base`: the parts together are all seeds.
     #[must_use]
     pub fn seeds(self, base: u64, count: u64) -> Vec<u64> {
-        (0..count)
-            .filter(|offset| self.has(*offset))
-            .map(|offset| base.saturating_add(1).saturating_add(offset))
-            .collect()
+        (0..count).filter(|offset| self.has(*offset)).map(|offset| base + 1 + offset).collect()
     }
 }
 

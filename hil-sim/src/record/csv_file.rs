@@ -21,6 +21,9 @@ pub struct Metadata {
     pub parameters: Option<String>,
     /// Ticks that ran, once the log is complete.
     pub ticks: Option<u64>,
+    /// The ledger of the crossings, once the log is complete; null in a log of several starts.
+    #[serde(default)]
+    pub crossings: Value,
 }
 
 /// Path of the metadata of the table at `csv`.
@@ -130,7 +133,8 @@ mod tests {
         assert_eq!(metadata_of(&csv), Ok(Metadata::default()));
         let parameters = Some("[run]\nseed = 1\n".to_owned());
         let header = Some(Header { rig: "fe".to_owned(), ..Header::default() });
-        let metadata = Metadata { header, parameters, ticks: Some(7) };
+        let crossings = json!([]);
+        let metadata = Metadata { header, parameters, ticks: Some(7), crossings };
         let path = write_metadata(&csv, &metadata, false).unwrap();
         assert_eq!(metadata_of(&csv), Ok(metadata));
         std::fs::write(&path, "{").unwrap();

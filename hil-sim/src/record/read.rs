@@ -1,6 +1,6 @@
 //! Reads logs from files: MCAP, CSV, or the bare bytes of the channel.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::csv_file::{self, Metadata as TableMetadata};
 use super::mcap_file::unwrapped;
@@ -38,6 +38,11 @@ impl ReadError {
             Self::Content(_, why) => why.clone(),
         }
     }
+}
+
+/// The log at `path`: the file, or that of the run in this folder.
+pub fn log_at(path: &Path) -> PathBuf {
+    if path.is_dir() { path.join("log.mcap") } else { path.to_owned() }
 }
 
 /// The content of the file at `path`.
@@ -193,7 +198,7 @@ fn of_mcap(bytes: &[u8]) -> Run {
 /// Reads the controller's columns. Ticks that did not run and an incomplete last row are left
 /// out.
 fn of_csv(bytes: &[u8], metadata: TableMetadata) -> Result<Run, String> {
-    let TableMetadata { header, parameters, ticks: total } = metadata;
+    let TableMetadata { header, parameters, ticks: total, .. } = metadata;
     let mut run = Run { header, parameters, ..Run::default() };
     // A last row without its line feed may lack digits.
     let ends_within = bytes.last() != Some(&b'\n');
@@ -207,9 +212,13 @@ fn of_csv(bytes: &[u8], metadata: TableMetadata) -> Result<Run, String> {
     {
         return Err(format!("it lacks the column {name}"));
     }
+    let mut last = None;
     for row in reader.records() {
         let row = row.and_then(|row| row.deserialize::<Controller>(Some(&head)));
         let row = row.map_err(|error| error.to_string())?;
+        let behind = last.map_or(0, |last: u32| row.tick.saturating_sub(last.saturating_add(1)));
+        run.counts.lost_ticks += u64::from(behind);
+        last = Some(row.tick);
         // A tick that did not run.
         if row.mode != OFF {
             run.rows.push(row);
@@ -226,7 +235,6 @@ fn of_csv(bytes: &[u8], metadata: TableMetadata) -> Result<Run, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::path::PathBuf;
 
     use crate::record::decoder::tests::frames;
 

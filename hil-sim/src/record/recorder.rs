@@ -1,12 +1,13 @@
 //! Records a run as it goes on.
 
 use interstage::model::LimitedBy;
+use interstage::restart::Restart;
 use interstage::supervise::{Mode, ServiceDuties};
 use interstage::tick::{CrossingRecord, Entry, Event, Telemetry};
 use interstage::units::{Direction, Duty, Q16};
 use sha2::{Digest, Sha256};
 
-use super::tally::{Ended, TICK_S, Tally, true_line};
+use super::tally::{Ended, Tally, true_line};
 use super::{
     Controller, CrossingLine, LogLine, Recording, Report, Tick, mode_number, mode_words, stage_name,
 };
@@ -14,31 +15,17 @@ use crate::plant::ledger::Crossing;
 use crate::plant::rig::{Truth, VirtualRig};
 use crate::scenario::Scenario;
 
-/// The preload is reached within this part of its reference: the controller's tolerance of
-/// the measured preload, and three standard deviations of the sensor.
-const REACHED_PART: f64 = 0.035;
-
 /// The record of a run that goes on.
 pub struct RunRecorder {
     tally: Tally,
-    seen: ControllerView,
-}
-
-/// What the controller reported that the ledger of the crossings needs.
-#[derive(Default)]
-struct ControllerView {
-    /// Crossings, and when they were reported, s.
-    crossings: Vec<(f64, CrossingRecord)>,
-    /// True preload of every tick, N.
-    preload: Vec<f32>,
-    /// Preload reference of every tick, N.
-    reference: Vec<f32>,
+    /// Crossings as the controller reported them, and when, s.
+    reported: Vec<(f64, CrossingRecord)>,
 }
 
 impl RunRecorder {
     /// A run from `start_mm` with this reference gap, mm.
     pub fn new(gap_ref: f64, start_mm: f64) -> Self {
-        Self { tally: Tally::new(gap_ref, start_mm), seen: ControllerView::default() }
+        Self { tally: Tally::new(gap_ref, start_mm), reported: Vec::new() }
     }
 
     /// Takes a tick: the controller's state and events, the plant's `truth` before it, and the
@@ -50,7 +37,7 @@ impl RunRecorder {
         truth: &Truth,
         columns: Option<Controller>,
     ) {
-        let Self { tally, seen } = self;
+        let Self { tally, reported: crossings } = self;
         let t_s = tally.time_s();
         digest(&mut tally.digest, telemetry);
         for Entry { event, .. } in events {
@@ -61,13 +48,12 @@ impl RunRecorder {
                 None => {}
             }
             match event {
-                Event::Crossing(record) => seen.crossings.push((t_s, *record)),
+                Event::Crossing(record) => crossings.push((t_s, *record)),
+                Event::Restart(restart) => tally.restart(*restart),
                 Event::Mode(Mode::Preload(_)) => tally.accept_command(),
                 _ => {}
             }
         }
-        seen.preload.push(truth.preload_n as f32);
-        seen.reference.push(telemetry.preload_ref.to_num());
         if let Some(controller) = columns {
             tally.rows.push(Tick { controller, truth: Some(truth.into()) });
         }
@@ -76,7 +62,6 @@ impl RunRecorder {
 
     /// The record of a run on `target` that took `wall_s` to compute. `arrived` is the
     /// direction of a completed run, as the controller reports it.
-    /// The record of a run that took `wall_s` to compute.
     pub fn finish(
         self,
         target: &'static str,
@@ -85,48 +70,31 @@ impl RunRecorder {
         arrived: Option<Direction>,
         wall_s: f64,
     ) -> Recording {
-        let Self { tally, seen } = self;
+        let Self { tally, reported } = self;
         let ended = Ended { target, scenario, plant, arrived, wall_s };
-        tally.finish(&ended, |crossing| seen.line(crossing))
+        tally.finish(&ended, |crossing| crossing_line(crossing, &reported))
     }
 }
 
-impl ControllerView {
-    /// Ledger line: the plant's truth beside what the controller reported of the same step.
-    fn line(&self, crossing: &Crossing) -> CrossingLine {
-        // Reported when the crossing is closed: the first of this step after lift-off.
-        let same = |(t_s, r): &&(f64, CrossingRecord)| {
-            *t_s >= crossing.lift_s
-                && (r.direction == Direction::Deploy) == crossing.climbing
-                && (r.position.to_num::<f64>() - crossing.step_mm).abs() < 5.0
-        };
-        let reported = self.crossings.iter().find(same);
-        let num = |f: fn(&CrossingRecord) -> Q16| reported.map(|(_, r)| f(r).to_num::<f64>());
-        CrossingLine {
-            gap_predicted_mm: num(|r| r.gap_predicted),
-            gap_measured_mm: num(|r| r.gap_measured),
-            slip_measured_mm: num(|r| r.slip),
-            height_measured_mm: num(|r| r.height),
-            lead_time_s: Some(self.lead_time(crossing.touch_s)),
-            step_found_mm: num(|r| r.position),
-            limited_by: reported.and_then(|(_, r)| r.limited_by),
-            ..true_line(crossing)
-        }
-    }
-
-    /// How long the true preload had been close to the reference when the corner touched, s;
-    /// negative if it was reached later.
-    fn lead_time(&self, touch_s: f64) -> f64 {
-        let touch = ((touch_s / TICK_S) as usize).min(self.preload.len().saturating_sub(1));
-        let wanted = self.reference.get(touch).copied().map_or(0.0, f64::from);
-        let reached = |n: &f32| f64::from(*n) >= wanted * (1.0 - REACHED_PART);
-        if self.preload.get(touch).is_some_and(reached) {
-            let since = self.preload[..touch].iter().rposition(|n| !reached(n));
-            (touch - since.map_or(0, |i| i + 1)) as f64 * TICK_S
-        } else {
-            let late = self.preload[touch..].iter().position(reached);
-            -(late.unwrap_or(self.preload.len() - touch) as f64) * TICK_S
-        }
+/// Ledger line: the plant's truth beside what the controller reported of the same step.
+fn crossing_line(crossing: &Crossing, reported: &[(f64, CrossingRecord)]) -> CrossingLine {
+    // Reported when the crossing is closed: the first of this step after lift-off.
+    let same = |(t_s, r): &&(f64, CrossingRecord)| {
+        *t_s >= crossing.lift_s
+            && (r.direction == Direction::Deploy) == crossing.climbing
+            && (r.position.to_num::<f64>() - crossing.step_mm).abs() < 5.0
+    };
+    let reported = reported.iter().find(same);
+    let num = |f: fn(&CrossingRecord) -> Q16| reported.map(|(_, r)| f(r).to_num::<f64>());
+    CrossingLine {
+        gap_predicted_mm: num(|r| r.gap_predicted),
+        gap_measured_mm: num(|r| r.gap_measured),
+        slip_measured_mm: num(|r| r.slip),
+        height_measured_mm: num(|r| r.height),
+        lead_time_s: num(|r| r.lead_time),
+        step_found_mm: num(|r| r.position),
+        limited_by: reported.and_then(|(_, r)| r.limited_by),
+        ..true_line(crossing)
     }
 }
 
@@ -149,6 +117,11 @@ pub(super) fn reported(t_s: f64, event: &Event) -> Option<(bool, Report)> {
         _ => return None,
     };
     Some((latched, Report { t_s, code, text: text.to_owned() }))
+}
+
+/// What restarted the target, and what it did before.
+pub(super) fn restart_words(restart: Restart) -> String {
+    restart.to_string().replacen("started: ", "", 1)
 }
 
 /// An event as one line of text.

@@ -1,4 +1,4 @@
-//! Makes the recording that a report shows from a log.
+//! Makes the recordings that a report shows from a log, one of each start of the target.
 //!
 //! The log of a deployment on the virtual rig contains the plant's truth. A captured log has
 //! the controller's estimates alone; what is unknown there is `NaN`.
@@ -16,13 +16,13 @@ use serde::de::DeserializeOwned;
 use serde_json::Value;
 
 use super::read::{MCAP, ReadError, content, is_table, parameters, records};
-use super::recorder::{reported, text};
+use super::recorder::{reported, restart_words, text};
 use super::time_lost::{TimeLost, TimeSplit};
 use super::{Controller, CrossingLine, LedgerLine, LogLine, Recording, Run, Summary, Tick};
 use crate::scenario::Scenario;
 
-/// Reads the recording of any log.
-pub fn recording(path: &Path) -> Result<Recording, ReadError> {
+/// Reads the recordings of any log: of each start of the target, as its clock begins anew there.
+pub fn recordings(path: &Path) -> Result<Vec<Recording>, ReadError> {
     let bytes = content(path)?;
     if is_table(&bytes) {
         return Err(ReadError::Table(path.display().to_string()));
@@ -30,9 +30,9 @@ pub fn recording(path: &Path) -> Result<Recording, ReadError> {
     if bytes.starts_with(MCAP)
         && let Some(recording) = with_truth(&bytes)
     {
-        return Ok(recording);
+        return Ok(vec![recording]);
     }
-    Ok(measured(&Run::read(path)?))
+    Ok(boots(&Run::read(path)?))
 }
 
 /// The recording in the log of a deployment; none if there is no summary in it.
@@ -60,8 +60,20 @@ fn with_truth(bytes: &[u8]) -> Option<Recording> {
     Some(recording)
 }
 
-/// The recording of a log without truth: what the controller measured.
-pub(crate) fn measured(run: &Run) -> Recording {
+/// The recordings of a log without truth; each says what restarted the target behind it.
+fn boots(run: &Run) -> Vec<Recording> {
+    let boots = run.by_boot();
+    let mut recordings: Vec<Recording> = boots.iter().map(measured).collect();
+    for (recording, next) in recordings.iter_mut().zip(boots.iter().skip(1)) {
+        let cause = next.since_boot(0).restart();
+        recording.summary.restart =
+            Some(cause.map_or_else(|| "no cause in the log".to_owned(), restart_words));
+    }
+    recordings
+}
+
+/// The recording of a start of the target: what the controller measured.
+fn measured(run: &Run) -> Recording {
     let mut summary = summary(run);
     let mut log = Vec::new();
     for entry in &run.events {
@@ -88,10 +100,10 @@ pub(crate) fn measured(run: &Run) -> Recording {
 }
 
 /// Tick that accepted the command which the first motion of the log follows from: there the
-/// preload began to build. None if it is not in the log, or on another start's clock.
+/// preload began to build. None if it is not in the log.
 fn commanded(run: &Run) -> Option<u32> {
     let mut before = None;
-    for entry in run.events.iter().filter(|_| run.boots.is_empty()) {
+    for entry in &run.events {
         let Event::Mode(mode) = entry.event else { continue };
         if mode.moves() {
             return before.and_then(|(mode, at)| matches!(mode, Mode::Preload(_)).then_some(at));
@@ -152,6 +164,7 @@ fn summary(run: &Run) -> Summary {
             .to_owned(),
         direction: if retracts { "retract" } else { "deploy" }.to_owned(),
         rig: header.rig,
+        commanded_s: commanded(run).map(|at| 1e-3 * f64::from(at)),
         duration_s: last.zip(commanded(run)).map(|(row, at)| row.t_s - 1e-3 * f64::from(at)),
         lost: lost(run, scenario.as_ref()),
         moving_s: between(|row| row.t_s),
@@ -205,7 +218,7 @@ fn crossing(run: &Run, line: &Line) -> CrossingLine {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::record::{Boot, write_mcap};
+    use crate::record::write_mcap;
     use crate::session;
 
     fn run() -> Recording {
@@ -219,7 +232,7 @@ mod tests {
         let path = directory.path().join("log.mcap");
         let written = run();
         write_mcap(&written, &path).unwrap();
-        let read = recording(&path).unwrap();
+        let read = recordings(&path).unwrap().remove(0);
         assert_eq!(read.summary, written.summary);
         assert_eq!(format!("{:?}", read.rows), format!("{:?}", written.rows));
         assert_eq!(read.log.len(), written.log.len());
@@ -241,9 +254,6 @@ mod tests {
         let late = measured(&Run { events, ..whole.clone() }).summary;
         assert_eq!(late.duration_s, None);
         assert!(late.moving_s > 1.0);
-        // A restart in between: two clocks.
-        let restarted = Run { boots: vec![Boot::default()], ..whole };
-        assert_eq!(measured(&restarted).summary.duration_s, None);
     }
 
     #[test]

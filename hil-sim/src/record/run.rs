@@ -90,6 +90,7 @@ pub struct Boot {
     pub events: usize,
     pub plans: usize,
     pub requests: usize,
+    pub ledger: usize,
 }
 
 /// Items from one start of the target to the next.
@@ -100,6 +101,7 @@ pub struct Since<'a> {
     pub plans: &'a [(u32, Plan)],
     /// Requests with the ticks that made them.
     pub requests: &'a [(u32, PlanRequest)],
+    pub ledger: &'a [Line],
 }
 
 impl Since<'_> {
@@ -221,13 +223,41 @@ impl Run {
             events: self.events.get(from.events..to.events).unwrap_or_default(),
             plans: self.plans.get(from.plans..to.plans).unwrap_or_default(),
             requests: self.requests.get(from.requests..to.requests).unwrap_or_default(),
+            ledger: self.ledger.get(from.ledger..to.ledger).unwrap_or_default(),
         }
+    }
+
+    /// Rows, events and ledger of each start of the target, on its own clock. What is missing is
+    /// counted in the last.
+    pub fn by_boot(&self) -> Vec<Self> {
+        let restarts = self.marks.iter().filter(|(_, mark)| *mark == Mark::Restart);
+        let ends: Vec<usize> = restarts.map(|(row, _)| *row).chain([self.rows.len()]).collect();
+        let boot = |(place, end): (usize, &usize)| {
+            let from = place.checked_sub(1).map_or(0, |before| ends[before]);
+            let Since { events, ledger, .. } = self.since_boot(place);
+            let is_last = place + 1 == ends.len();
+            Self {
+                header: self.header.clone(),
+                rows: self.rows[from..*end].to_vec(),
+                events: events.to_vec(),
+                ledger: ledger.to_vec(),
+                counts: if is_last { self.counts } else { Counts::default() },
+                parameters: self.parameters.clone(),
+                cut: self.cut.filter(|_| is_last),
+                ..Self::default()
+            }
+        };
+        ends.iter().enumerate().map(boot).collect()
     }
 
     /// What has come so far.
     fn end(&self) -> Boot {
-        let Self { events, plans, requests, .. } = self;
-        Boot { events: events.len(), plans: plans.len(), requests: requests.len() }
+        Boot {
+            events: self.events.len(),
+            plans: self.plans.len(),
+            requests: self.requests.len(),
+            ledger: self.ledger.len(),
+        }
     }
 
     /// Whether nothing is known to be missing.

@@ -21,7 +21,8 @@ pub struct CrossingLine {
     pub gap_measured_mm: Option<f64>,
     /// Largest force of corner and face on the wheel, N.
     pub corner_force_n: f64,
-    /// How long before the corner touched the preload was reached, s.
+    /// How long before the controller detected the corner the preload was reached, s; negative by
+    /// how long it was missing, until lift-off at most.
     pub lead_time_s: Option<f64>,
     /// Gross slip during the crossing, mm.
     pub slip_mm: f64,
@@ -99,6 +100,12 @@ pub struct Summary {
     /// What is missing of the log that this was read from, in sentences.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub missing: Vec<String>,
+    /// What restarted the controller and so ended the recording, in words.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub restart: Option<String>,
+    /// When the command was accepted that the motion follows from, s since boot.
+    #[serde(default)]
+    pub commanded_s: Option<f64>,
     /// From the accepted command to arrival, or to the end of the motion of a run that did not
     /// arrive, s; none if the log has no such command or nothing moved.
     pub duration_s: Option<f64>,
@@ -152,6 +159,21 @@ pub struct Recording {
     pub parameters: String,
     /// The binary log as it was on its channel; empty if it was not kept.
     pub stream: Vec<u8>,
+}
+
+impl Recording {
+    /// The recording with its times counted from the command, if the log has it.
+    pub(crate) fn since_command(&self) -> Self {
+        let mut from = self.clone();
+        let zero_s = self.summary.commanded_s.unwrap_or(0.0);
+        let Summary { faults, limits, crossings, .. } = &mut from.summary;
+        let reports = faults.iter_mut().chain(limits).map(|report| &mut report.t_s);
+        let lines = crossings.iter_mut().flat_map(|line| [&mut line.touch_s, &mut line.lift_s]);
+        let log = from.log.iter_mut().map(|line| &mut line.t_s);
+        let rows = from.rows.iter_mut().map(|row| &mut row.controller.t_s);
+        reports.chain(lines).chain(log).chain(rows).for_each(|t_s| *t_s -= zero_s);
+        from
+    }
 }
 
 fn nan() -> f64 {

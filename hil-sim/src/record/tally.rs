@@ -1,9 +1,11 @@
 //! The sums of a run on any target: when it moved, with what preload, how far wheel and
 //! wall separated, whether it arrived.
 
+use interstage::restart::Restart;
 use interstage::units::Direction;
 use sha2::{Digest, Sha256};
 
+use super::recorder::restart_words;
 use super::tick::MOVES;
 use super::time_lost::TimeSplit;
 use super::{CrossingLine, LogLine, Recording, Report, Summary, Tick, drawn};
@@ -38,6 +40,8 @@ pub(super) struct Tally {
     moving: u32,
     worst_separation: f64,
     split: TimeSplit,
+    /// What restarted the controller after the command.
+    restart: Option<String>,
     passed: u32,
 }
 
@@ -69,6 +73,13 @@ impl Tally {
     pub(super) fn accept_command(&mut self) {
         if self.run_started.is_none() {
             self.commanded = Some(self.time_s());
+        }
+    }
+
+    /// The controller reports why it started: under way, that ends the run.
+    pub(super) fn restart(&mut self, cause: Restart) {
+        if self.commanded.is_some() {
+            self.restart = Some(restart_words(cause));
         }
     }
 
@@ -120,6 +131,7 @@ impl Tally {
             drawn: drawn::of(plant.parameters(), scenario),
             measured: false,
             missing: Vec::new(),
+            commanded_s: self.run_started.and(self.commanded),
             duration_s: self.run_started.and(self.commanded).map(|from| self.run_ended - from),
             moving_s: self.run_started.map_or(0.0, |from| self.run_ended - from),
             lost: completed.then(|| self.split.lost(cruise_mm_s)),
@@ -136,6 +148,7 @@ impl Tally {
             injected: scenario.run.faults.iter().map(ToString::to_string).collect(),
             real_time_factor: total_s / wall_s.max(1e-9),
             trace_digest: self.digest.finalize().iter().map(|b| format!("{b:02x}")).collect(),
+            restart: self.restart,
             crossings,
         };
         Recording {

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::tick::{CROSSES, MOVES, PRELOADS};
+use crate::table::number;
 
 /// What a run takes longer than its travel at cruise speed, s. With that travel the parts add up
 /// to the duration.
@@ -20,11 +21,25 @@ pub struct TimeLost {
 }
 
 impl TimeLost {
+    /// The largest part, in words.
+    pub(crate) fn main(&self) -> String {
+        let parts = [
+            (self.preload_s, "the wheel waits for the first preload"),
+            (self.approach_s, "it is slow or waits before the steps"),
+            (self.crossing_s, "it is slow on the steps"),
+            (self.end_s, "it is slow behind the last step"),
+        ];
+        let most = parts.into_iter().max_by(|a, b| a.0.total_cmp(&b.0));
+        most.map_or_else(String::new, |(s, what)| format!("{what} ({s:.2} s)"))
+    }
+
     pub fn sentence(&self) -> String {
         let Self { preload_s, approach_s, crossing_s, end_s } = self;
+        let [preload, approach, crossing, end] =
+            [preload_s, approach_s, crossing_s, end_s].map(|part| number(*part, 2));
         format!(
-            "Time beside travel at cruise speed: {preload_s:.2} s until the preload carries the wheel, \
-             {approach_s:.2} s before the steps, {crossing_s:.2} s on them, {end_s:.2} s at the end"
+            "Time beside travel at cruise speed: {preload} s until the preload carries the wheel, \
+             {approach} s before the steps, {crossing} s on them, {end} s at the end"
         )
     }
 }

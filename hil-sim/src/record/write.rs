@@ -63,7 +63,8 @@ pub fn write_all(recording: &Recording, directory: &Path) -> Result<Vec<PathBuf>
     let header = Run::of_stream(&recording.stream).header;
     let parameters = Some(recording.parameters.clone());
     let ticks = recording.rows.iter().filter(|row| row.controller.mode != OFF).count() as u64;
-    let metadata = Metadata { header, parameters, ticks: Some(ticks) };
+    let crossings = serde_json::json!(recording.summary.crossings);
+    let metadata = Metadata { header, parameters, ticks: Some(ticks), crossings };
     let described = write_metadata(&csv, &metadata, true)?;
     write_mcap(recording, &mcap)?;
     atomic_write(&summary, |out| {

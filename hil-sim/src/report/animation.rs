@@ -35,7 +35,7 @@ pub(super) fn script(scene: &Scene) -> String {
 }
 
 fn why(scene: &Scene) -> String {
-    let cruise_n = number(scene.geometry.cruise_n, 1);
+    let did = at_the_steps(scene);
     let instant = if scene.retracts {
         "The wheel rolls over the edge, and for a moment the edge alone carries it until it \
 reaches the lower wall."
@@ -47,14 +47,24 @@ that wall carries none."
         "{instant} At that instant the <b>gap</b> is open between the step's root and the wheel. \
 Rubber needs time to yield: the faster the crossing, the stiffer the tread and the larger the gap. \
 More preload presses the tread deeper into the corner and closes the gap again, and it gives the \
-wheel more friction. So the controller raises the preload from the {cruise_n} N of \
-the smooth wall, early enough for the slow pre-tightener.{}",
+wheel more friction. {did}{}",
         if scene.gap_ref_mm > 0.0 {
             format!(" The gap must not exceed its reference of {:.2} mm.", scene.gap_ref_mm)
         } else {
             String::new()
         }
     )
+}
+
+/// What this run's preload was at its steps.
+fn at_the_steps(scene: &Scene) -> String {
+    let cruise_n = number(scene.geometry.cruise_n, 1);
+    let at =
+        scene.crossings.iter().map(|c| format!("{} N at step {}", number(c.preload_n, 1), c.index));
+    match at.collect::<Vec<_>>().join(", ") {
+        at if at.is_empty() => format!("The smooth wall's preload is {cruise_n} N."),
+        at => format!("Here it was {at}; on the smooth wall {cruise_n} N are wanted."),
+    }
 }
 
 /// What the preload did at each crossing.
@@ -193,6 +203,10 @@ mod tests {
         let scene = Scene::new(&example::deploy()).unwrap();
         let html = html(Some(&scene));
         assert!(html.contains("= 13.6 mm before the face"), "{html}");
+        for c in &scene.crossings {
+            assert!(html.contains(&format!("{:.1} N at step {}", c.preload_n, c.index)), "{html}");
+        }
+        assert!(!html.contains("raises the preload"));
         assert_eq!(html.matches("<figcaption>").count(), 2);
     }
 

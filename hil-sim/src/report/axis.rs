@@ -5,6 +5,8 @@ use std::ops::Range;
 use plotters::coord::ranged1d::{DefaultFormatting, KeyPointHint, Ranged};
 use plotters::coord::types::RangedCoordf64;
 
+pub use crate::table::label;
+
 /// An axis with ticks of our own choice.
 pub struct Scale {
     coord: RangedCoordf64,
@@ -68,16 +70,6 @@ pub fn ticks(range: (f64, f64), most: usize) -> (Vec<f64>, usize) {
     let last = (range.1 / step + 1e-9).floor() as i64;
     let decimals = (-(step * 1.000_001).log10().floor()).max(0.0) as usize;
     ((first..=last).map(|n| n as f64 * step).collect(), decimals)
-}
-
-/// `value` with `decimals`, without a negative zero.
-pub fn label(value: f64, decimals: usize) -> String {
-    let text = format!("{value:.decimals$}");
-    if text.trim_start_matches(['-', '0', '.']).is_empty() {
-        text.trim_start_matches('-').to_owned()
-    } else {
-        text
-    }
 }
 
 #[cfg(test)]

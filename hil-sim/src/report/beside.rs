@@ -4,15 +4,12 @@ use plotters::style::RGBColor;
 
 use super::axis;
 use super::palette;
-use super::panel::{Line, Look, Marks, Panel, Shape};
+use super::panel::{Line, Look, Marks, Panel, Shape, stacked};
 use super::panels::{Across, View};
-use super::svg;
 use crate::record::{CrossingLine, Recording, Tick};
 
 /// Size, CSS pixels: its text can still be read at 400.
 const SIZE: (u32, u32) = (640, 860);
-/// More height for the last plot, which has the time axis.
-const AXIS_HEIGHT: u32 = 36;
 /// Colours of the two.
 const COLOURS: [RGBColor; 2] = [palette::PRELOAD, palette::SPEED];
 
@@ -43,16 +40,7 @@ pub fn beside_svg(runs: [(&str, &Recording); 2]) -> String {
     slip.least_span = 2.0;
     let mut last = gap(&views, runs, panel("Gap at the steps", "gap, mm", &|_| f64::NAN));
     last.x_name = Some(Across::Time.name());
-    let height = svg::SCALE * (SIZE.1 - AXIS_HEIGHT) / 4;
-    svg::fixed(SIZE, |area| {
-        let mut rest = area.clone();
-        for panel in [&preload, &position, &slip] {
-            let (top, below) = rest.split_vertically(height);
-            panel.draw(&top)?;
-            rest = below;
-        }
-        last.draw(&rest)
-    })
+    stacked(SIZE, &mut [preload, position, slip, last])
 }
 
 /// The gap of every crossing, beside the reference.

@@ -1,18 +1,13 @@
 //! Two runs side by side, crossing by crossing.
 
+use super::beside::beside_svg;
 use super::ledger::{COLUMNS, Column};
 use super::page::{head, section};
-use super::palette;
-use super::panel::{Line, Look, Panel};
-use super::panels::{Across, View};
-use super::svg::{self, escape};
+use super::svg::escape;
 use super::tables;
 use super::verdict::{gap_sentence, headline};
-use crate::record::{CrossingLine, Recording, Tick};
+use crate::record::{CrossingLine, Recording};
 use crate::table::number;
-
-/// Size of a plot, CSS pixels.
-const SIZE: (u32, u32) = (1100, 240);
 
 /// A difference between the two runs at a crossing.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
@@ -75,56 +70,23 @@ pub fn compare_html((name_a, a): (&str, &Recording), (name_b, b): (&str, &Record
             escape(&gap_sentence(&run.summary)),
         );
     }
-    page += &section("Crossing by crossing", &table(&differences(a, b)));
-    page += &section("Along the travel", &plots(a, b));
+    let (head, rows) = table(&differences(a, b));
+    page += &section("Crossing by crossing", &tables::table("ledger", &head, rows));
+    let picture = beside_svg([("A", a), ("B", b)]);
+    page += &section("Over time", &format!("<figure class=\"wide\">{picture}</figure>\n"));
     page + "</main>\n</body>\n</html>\n"
 }
 
-fn table(differences: &[Difference]) -> String {
-    if differences.is_empty() {
-        return "<p>Neither run crossed a step.</p>\n".to_owned();
-    }
-    let head = ["step", "quantity", "A", "B", "B - A"].map(str::to_owned);
+/// The differences as a table's head and rows.
+pub fn table(differences: &[Difference]) -> (Vec<String>, Vec<Vec<String>>) {
+    let head = ["step", "quantity", "A", "B", "B - A"].map(str::to_owned).to_vec();
     let rows =
         differences.iter().map(|Difference { index, quantity, unit, decimals, a, b, change }| {
-            let change =
-                change.map_or_else(|| number(None, 0), |change| format!("{change:+.decimals$}"));
-            let (a, b) = (number(*a, *decimals), number(*b, *decimals));
+            let [a, b, change] = [a, b, change].map(|value| number(*value, *decimals));
             let unit = if unit.is_empty() { String::new() } else { format!(", {unit}") };
             vec![index.to_string(), format!("{quantity}{unit}"), a, b, change]
         });
-    tables::table("ledger", &head, rows.collect())
-}
-
-/// A plot: title, name of the axis, quantity.
-type Plot = (&'static str, &'static str, fn(&Tick) -> f64);
-
-fn plots(a: &Recording, b: &Recording) -> String {
-    let plots: [Plot; 4] = [
-        ("Speed", "speed, mm/s", |row| row.controller.wheel_speed_mm_s),
-        ("Preload", "preload, N", |row| row.controller.preload_n),
-        ("Tread compression", "compression, mm", |row| row.controller.compression_mm),
-        ("Radial position", "radius, mm", |row| row.controller.radius_mm),
-    ];
-    let (a, b) = (View::new(a, Across::Position), View::new(b, Across::Position));
-    let mut html = String::new();
-    for (title, y_name, of) in plots {
-        let line = |name: &'static str, colour, view: &View| {
-            let moving = view.rows.iter().filter(|row| (5..=9).contains(&row.controller.mode));
-            let points = moving.map(|row| (row.position_mm(), of(row))).collect();
-            Line { name: name.into(), look: Look::Other(colour), points }
-        };
-        let panel = Panel {
-            x: (a.x.0.min(b.x.0), a.x.1.max(b.x.1)),
-            lines: vec![line("A", palette::SPEED, &a), line("B", palette::PRELOAD, &b)],
-            shades: Vec::new(),
-            rules: Vec::new(),
-            ..a.panel(title, y_name)
-        };
-        let plot = svg::fluid(SIZE, title, |area| panel.draw(area));
-        html += &format!("<figure class=\"wide\">{plot}</figure>\n");
-    }
-    html
+    (head, rows.collect())
 }
 
 #[cfg(test)]
@@ -154,7 +116,7 @@ mod tests {
         let page = compare_html(("one.mcap", &a), ("two <2>.mcap", &b));
         assert!(page.contains("A: one.mcap") && page.contains("B: two &lt;2&gt;.mcap"));
         assert!(page.contains("fault 121") && page.contains("B - A"));
-        assert_eq!(page.matches("<svg").count(), 4);
+        assert_eq!(page.matches("<svg").count(), 1);
         assert!(!page.contains("NaN"));
     }
 }

@@ -14,7 +14,7 @@ pub(crate) struct Column {
     pub(crate) of: fn(&CrossingLine) -> Option<f64>,
     /// The true value of a prediction or measurement, and the error as text.
     pub(crate) truth: Option<Truth>,
-    /// Shown on a terminal, which has no room for all.
+    /// Shown on a terminal without -v: it has no room for all.
     pub(crate) on_terminal: bool,
 }
 
@@ -32,7 +32,11 @@ pub(crate) const COLUMNS: [Column; 13] = {
     const STEP: Option<Truth> = Some((|c| c.step_mm, step_error));
     [
         new("gap", "mm", 3, |c| Some(c.gap_mm)),
-        Column { truth: GAP, ..new("predicted", "mm", 3, |c| c.gap_predicted_mm) },
+        Column {
+            truth: GAP,
+            on_terminal: false,
+            ..new("predicted", "mm", 3, |c| c.gap_predicted_mm)
+        },
         Column { truth: GAP, ..new("measured", "mm", 3, |c| c.gap_measured_mm) },
         new("speed", "mm/s", 2, |c| Some(c.speed_mm_s)),
         new("preload", "N", 2, |c| Some(c.preload_n)),
@@ -42,7 +46,7 @@ pub(crate) const COLUMNS: [Column; 13] = {
         new("lead", "s", 2, |c| c.lead_time_s),
         Column { on_terminal: false, ..new("slip", "mm", 2, |c| Some(c.slip_mm)) },
         new("step at", "mm", 2, |c| Some(c.step_mm)),
-        Column { truth: STEP, ..new("found at", "mm", 2, |c| c.step_found_mm) },
+        Column { truth: STEP, on_terminal: false, ..new("found at", "mm", 2, |c| c.step_found_mm) },
         Column {
             on_terminal: false,
             ..new("touch to lift", "s", 3, |c| Some((c.lift_s - c.touch_s).abs()))
@@ -51,8 +55,16 @@ pub(crate) const COLUMNS: [Column; 13] = {
 };
 
 /// What kept a crossing from being faster, in words.
-pub(crate) fn limited_by(line: &CrossingLine) -> &'static str {
-    line.limited_by.map_or("-", LimitedBy::words)
+pub(crate) fn slowed_by(line: &CrossingLine) -> &'static str {
+    match line.limited_by {
+        None => "-",
+        Some(LimitedBy::Preload) => "preload limit",
+        Some(LimitedBy::Slew) => "slow preload",
+        Some(LimitedBy::Friction) => "low friction",
+        Some(LimitedBy::Resonance) => "resonance",
+        Some(LimitedBy::LeastSpeed) => "least speed",
+        Some(LimitedBy::Drive) => "drive speed",
+    }
 }
 
 fn gap_error(error: f64, truth: f64) -> String {

@@ -4,7 +4,7 @@ use super::panel::Panel;
 use super::panels::{Across, View, attributes, figure, motion};
 use super::scene::Scene;
 use super::svg::{self, escape};
-use super::verdict::{Grade, gap_sentence, headline, origin, reservations, slip_sentence};
+use super::verdict::{Grade, gap_sentence, headline, origin, slip_sentence, verdict};
 use super::{animation, band, crossings, tables};
 use crate::record::Recording;
 
@@ -26,10 +26,11 @@ pub struct Section {
 /// The page of `recording`, with `more` sections. It needs no other file; without its
 /// script it lacks the animation alone.
 pub fn html(recording: &Recording, more: &[Section]) -> String {
+    let recording = &recording.since_command();
     let s = &recording.summary;
     let title = escape(&format!("{} on {}, seed {}", s.direction, s.rig, s.seed));
     let grade = Grade::of(s).name();
-    let remarks = reservations(s).into_iter().map(str::to_owned);
+    let remarks = Some(verdict(s)).filter(|verdict| !verdict.is_empty()).into_iter();
     let remarks = remarks.chain(s.missing.iter().map(|what| format!("incomplete log: {what}")));
     let remarks: String =
         remarks.map(|text| format!("<p class=\"remark\">{}</p>\n", escape(&text))).collect();
@@ -62,7 +63,7 @@ and the undeformed wheel at the instant at which the lower wall stops carrying l
     page += &section("Faults and limits", &tables::reports(s));
     let scene = Scene::new(recording);
     if !recording.rows.is_empty() {
-        page += &section("Why the preload rises", &animation::html(scene.as_ref()));
+        page += &section("The gap at the steps", &animation::html(scene.as_ref()));
     }
     page += &section("The run", &plots(recording));
     page += &section("The crossings enlarged", &crossings::html(recording));
@@ -70,8 +71,9 @@ and the undeformed wheel at the instant at which the lower wall stops carrying l
         page += &section(title, body);
     }
     page += &section("Log", &folded("Lines of the log", &tables::log(&recording.log)));
-    let parameters = format!("<pre>{}</pre>\n", escape(&recording.parameters));
-    page += &section("Parameters", &folded("Parameters used, as TOML", &parameters));
+    let all = format!("<pre>{}</pre>\n", escape(&recording.parameters));
+    let all = folded("Parameters used, as TOML", &all);
+    page += &section("Parameters", &(tables::overrides(s) + &all));
     page += &format!(
         "<footer>\n<p>Written by hil-sim {} with the controller interstage {}.</p>\n\
 <p>Trace digest, SHA-256: <code>{}</code></p>\n</footer>\n</main>\n{}</body>\n</html>\n",
@@ -81,6 +83,41 @@ and the undeformed wheel at the instant at which the lower wall stops carrying l
         scene.as_ref().map(animation::script).unwrap_or_default(),
     );
     page
+}
+
+/// The page of a log: of one start of the target as [`html`], of several a section each.
+pub fn log_html(boots: &[Recording]) -> String {
+    if let [boot] = boots {
+        return html(boot, &[]);
+    }
+    let one = |(n, boot): (usize, &Recording)| {
+        let boot = &boot.since_command();
+        let s = &boot.summary;
+        let cause = s.restart.as_ref().map_or_else(String::new, |cause| {
+            format!("<p class=\"remark\">Ended by a restart: {}</p>\n", escape(cause))
+        });
+        let lost =
+            s.missing.iter().map(|what| format!("<p>Incomplete log: {}</p>\n", escape(what)));
+        let plots = if boot.rows.is_empty() { String::new() } else { stack(boot, Across::Time) };
+        let body = format!(
+            "<p><b>{}</b>; {}; {}</p>\n{cause}{}{}{}{plots}{}{}",
+            escape(&headline(s)),
+            gap_sentence(s),
+            slip_sentence(s),
+            lost.collect::<String>(),
+            tables::ledger(&s.crossings),
+            tables::reports(s),
+            folded("The crossings enlarged", &crossings::html(boot)),
+            folded("Lines of the log", &tables::log(&boot.log)),
+        );
+        section(&format!("Start {} of {}", n + 1, boots.len()), &body)
+    };
+    let sections: String = boots.iter().enumerate().map(one).collect();
+    let moved = boots.iter().map(|boot| &boot.summary).filter(|s| s.moving_s > 0.0);
+    let grade = moved.map(Grade::of).max_by_key(|grade| *grade as u8).map_or("fair", Grade::name);
+    let title = boots.last().map_or_else(String::new, |boot| origin(&boot.summary));
+    let headline = format!("{} starts of the controller, each on its own clock", boots.len());
+    page_of(&title, grade, &headline, &sections)
 }
 
 /// A page of its own: title, grade (`good`, `fair`, `bad`), headline and sections.
@@ -125,13 +162,17 @@ fn plots(recording: &Recording) -> String {
             row.controller.t_s
         )
     });
+    let commanded = recording.summary.commanded_s.is_some();
+    let zero = if commanded { "the command" } else { "the start of the controller" };
     format!(
         "<input type=\"radio\" name=\"across\" id=\"time\" checked>\
 <label for=\"time\">over time</label>\n\
 <input type=\"radio\" name=\"across\" id=\"position\">\
 <label for=\"position\">over position</label>\n\
 <p class=\"note\">Shaded: from the first touch of the corner (dotted) to the instant of the gap. \
-Grey line: the axle passes the face of the step.{from}</p>\n\
+Grey line: the axle passes the face of the step. Red and amber: a fault and a limit. Time counts \
+from {zero}. The log's line of a crossing comes when the crossing is closed, behind the \
+face.{from}</p>\n\
 <div class=\"time\">\n{time}</div>\n<div class=\"position\">\n{position}</div>\n"
     )
 }

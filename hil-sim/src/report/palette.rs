@@ -14,6 +14,9 @@ pub(crate) const TOUCH: RGBColor = RGBColor(0xb4, 0x53, 0x09);
 /// Face of a step.
 pub(crate) const FACE: RGBColor = RGBColor(0x64, 0x74, 0x8b);
 
+/// A limit that was reported.
+pub(crate) const WARNING: RGBColor = RGBColor(0xd9, 0x9a, 0x06);
+
 /// Simulated by the reference models; drawn dashed, see `DASHES`.
 pub const SIMULATED: RGBColor = RGBColor(0x1c, 0x6f, 0xd6);
 

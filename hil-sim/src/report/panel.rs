@@ -84,6 +84,7 @@ pub(crate) struct Marks {
 }
 
 /// One plot.
+#[derive(Default)]
 pub(crate) struct Panel {
     pub(crate) title: String,
     /// Name of the vertical axis, with its unit.
@@ -106,12 +107,31 @@ pub(crate) struct Panel {
 }
 
 /// A vertical line of a plot.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Rule {
     pub(crate) x: f64,
-    pub(crate) name: &'static str,
-    /// The first touch of a corner, dashed; else the face of a step.
-    pub(crate) touch: bool,
+    pub(crate) name: String,
+    /// That of a touch of a corner, a face, a fault or a limit.
+    pub(crate) colour: RGBColor,
+}
+
+/// More height for the last of stacked plots, which has the axis, CSS pixels.
+const AXIS_HEIGHT: u32 = 36;
+
+/// Plots over one axis, one below the other, as an SVG of this size, CSS pixels.
+pub(crate) fn stacked(size: (u32, u32), panels: &mut [Panel]) -> String {
+    let Some((last, above)) = panels.split_last_mut() else { return String::new() };
+    let height = SCALE * (size.1 - AXIS_HEIGHT) / (above.len() as u32 + 1);
+    super::svg::fixed(size, |area| {
+        let mut rest = area.clone();
+        for panel in above {
+            panel.x_name = None;
+            let (top, below) = rest.split_vertically(height);
+            panel.draw(&top)?;
+            rest = below;
+        }
+        last.draw(&rest)
+    })
 }
 
 impl Panel {
@@ -172,9 +192,8 @@ impl Panel {
         }
         let rules = self.rules.iter().filter(|rule| (self.x.0..=self.x.1).contains(&rule.x));
         for rule in rules.clone() {
-            let colour = if rule.touch { palette::TOUCH } else { palette::FACE };
             let ends = [(rule.x, y.0), (rule.x, y.1)];
-            chart.draw_series([PathElement::new(ends, colour.stroke_width(3))])?;
+            chart.draw_series([PathElement::new(ends, rule.colour.stroke_width(3))])?;
         }
         // Two CSS pixels: the lowest and highest values of a column stay.
         let columns = (wide as i32 - LEFT - RIGHT).max(1) as usize / 4;
@@ -198,16 +217,16 @@ impl Panel {
         };
         // Touches before faces; a name that would be on another one is left out.
         let mut taken: Vec<(i32, i32)> = Vec::new();
-        let (touches, faces): (Vec<&Rule>, Vec<&Rule>) = rules.partition(|rule| rule.touch);
+        let is_touch = |rule: &&Rule| rule.colour == palette::TOUCH;
+        let (touches, faces): (Vec<&Rule>, Vec<&Rule>) = rules.partition(is_touch);
         for rule in touches.into_iter().chain(faces) {
-            let (x, width) = (to_pixel(rule.x), text_width(rule.name, RULE_PX));
-            let is_left = rule.touch || x + width > wide as i32;
+            let (x, width) = (to_pixel(rule.x), text_width(&rule.name, RULE_PX));
+            let is_left = is_touch(&rule) || x + width > wide as i32;
             let (at, side) = if is_left { (x - 4, HPos::Right) } else { (x + 4, HPos::Left) };
             let from = if is_left { at - width } else { at };
             if taken.iter().all(|other| from >= other.1 || from + width <= other.0) {
-                let colour = if rule.touch { palette::TOUCH } else { palette::FACE };
-                let style = font(RULE_PX, colour, side, VPos::Center);
-                body.draw(&Text::new(rule.name, (at, RULES / 2), style))?;
+                let style = font(RULE_PX, rule.colour, side, VPos::Center);
+                body.draw(&Text::new(&*rule.name, (at, RULES / 2), style))?;
                 taken.push((from, from + width));
             }
         }
@@ -333,7 +352,9 @@ mod tests {
     fn the_frame_is_where_the_plot_is() {
         let x = (10.0, 20.0);
         let corners = vec![(10.0, 1.0), (20.0, 5.0)];
-        for rules in [vec![], vec![Rule { x: 12.0, name: "face", touch: false }]] {
+        for rules in
+            [vec![], vec![Rule { x: 12.0, name: "step 1".to_owned(), colour: palette::FACE }]]
+        {
             let panel = Panel {
                 title: "t".to_owned(),
                 y_name: "y, mm",

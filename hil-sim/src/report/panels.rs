@@ -4,9 +4,9 @@ use plotters::style::RGBColor;
 
 use super::axis;
 use super::palette;
-use super::panel::{Line, Look, Marks, Panel, Rule, Shape};
+use super::panel::{Line, Look, Marks, Panel, Rule, Shape, stacked};
 use super::svg;
-use crate::record::{CrossingLine, Recording, Tick};
+use crate::record::{CrossingLine, Recording, Report, Tick};
 
 /// From one mark of a crossing to the next, drawing units.
 const SIDE: i32 = 22;
@@ -18,13 +18,11 @@ const MOTION_MM: f64 = 0.01;
 
 /// Size of the overview, CSS pixels.
 const OVERVIEW: (u32, u32) = (1000, 820);
-/// More height for its last plot, which has the time axis.
-const AXIS_HEIGHT: u32 = 36;
 
 /// What the horizontal axis shows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Across {
-    /// Time since boot.
+    /// The recording's own time.
     Time,
     /// Time since this time, the first touch of a corner, s.
     Since(f64),
@@ -36,7 +34,7 @@ impl Across {
     /// Name of the axis, with its unit.
     pub(super) fn name(self) -> &'static str {
         match self {
-            Self::Time => "time since boot, s",
+            Self::Time => "time, s",
             Self::Since(_) => "time since the corner touched, s",
             Self::Position => "axial position, mm",
         }
@@ -126,6 +124,7 @@ impl<'a> View<'a> {
                 .crossings
                 .iter()
                 .flat_map(|c| rules(rows, across, c))
+                .chain(reports(recording, across))
                 .collect(),
             limit_n: parameter(&recording.parameters, "preload", "limit_n"),
         }
@@ -138,13 +137,9 @@ impl<'a> View<'a> {
             y_name,
             x_name: Some(self.across.name()),
             x: self.x,
-            y: None,
-            least_span: 0.0,
-            lines: Vec::new(),
-            marks: Vec::new(),
-            levels: Vec::new(),
             shades: self.shades.clone(),
             rules: self.rules.clone(),
+            ..Panel::default()
         }
     }
 
@@ -281,8 +276,8 @@ fn rules(rows: &[Tick], across: Across, line: &CrossingLine) -> Vec<Rule> {
     let long = matches!(across, Across::Since(_));
     let touch = Rule {
         x: across.at(rows, line.touch_s),
-        name: if long { "corner touches" } else { "touch" },
-        touch: true,
+        name: if long { "corner touches" } else { "touch" }.to_owned(),
+        colour: palette::TOUCH,
     };
     let from = rows.partition_point(|row| row.controller.t_s < line.touch_s.min(line.lift_s));
     let ahead = |row: &Tick| row.position_mm() < line.step_mm;
@@ -292,25 +287,28 @@ fn rules(rows: &[Tick], across: Across, line: &CrossingLine) -> Vec<Rule> {
         Across::Position => Some(line.step_mm),
         _ => passed.map(|row| across.of(row)),
     };
-    let face = face_x.map(|x| Rule { x, name: "face", touch: false });
+    let name = format!("step {}", line.index);
+    let face = face_x.map(|x| Rule { x, name, colour: palette::FACE });
     [touch].into_iter().chain(face).collect()
+}
+
+/// Faults and limits, by their codes.
+fn reports(recording: &Recording, across: Across) -> Vec<Rule> {
+    let Recording { summary, rows, .. } = recording;
+    let rule = |(report, colour): (&Report, RGBColor)| Rule {
+        x: across.at(rows, report.t_s),
+        name: report.code.to_string(),
+        colour,
+    };
+    let faults = summary.faults.iter().map(|report| (report, palette::LIMIT));
+    let limits = summary.limits.iter().map(|report| (report, palette::WARNING));
+    faults.chain(limits).map(rule).collect()
 }
 
 /// Speed, preload, gap and radius of a run over time, stacked, as an SVG of 1000 x 820.
 pub fn overview_svg(recording: &Recording) -> String {
     let view = View::new(recording, Across::Time);
-    let mut panels = [view.speed(), view.preload(), view.gap()];
-    let height = svg::SCALE * (OVERVIEW.1 - AXIS_HEIGHT) / (panels.len() as u32 + 1);
-    svg::fixed(OVERVIEW, |area| {
-        let mut rest = area.clone();
-        for panel in &mut panels {
-            panel.x_name = None;
-            let (top, below) = rest.split_vertically(height);
-            panel.draw(&top)?;
-            rest = below;
-        }
-        view.radius().draw(&rest)
-    })
+    stacked(OVERVIEW, &mut [view.speed(), view.preload(), view.gap(), view.radius()])
 }
 
 /// The number at `section.name` of parameters written as TOML.

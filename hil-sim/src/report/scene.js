@@ -55,7 +55,7 @@ function current(scene, t) {
 
 // What happens at a row, in words.
 function phase(scene, row) {
-  const n = (value, digits) => (value === null || !Number.isFinite(value) ? "unknown" : value.toFixed(digits));
+  const n = (value, digits) => (value === null || !Number.isFinite(value) ? "unknown" : value.toFixed(digits).replace(/^-(0\.?0*)$/, "$1"));
   const t = row.t_s;
   const next = current(scene, t);
   const said = scene.measured ? "measured " : "";

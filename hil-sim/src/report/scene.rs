@@ -261,7 +261,8 @@ fn values(geometry: &Geometry, row: &Tick) -> [f64; COLUMNS.len()] {
     };
     std::array::from_fn(|place| {
         let scale = 10_f64.powi(COLUMNS[place].1);
-        (values[place] * scale).round() / scale
+        // Plus zero: what rounds to zero has no sign.
+        (values[place] * scale).round() / scale + 0.0
     })
 }
 

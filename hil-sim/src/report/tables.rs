@@ -1,9 +1,11 @@
 //! The tables of the page.
 
-use super::ledger::{COLUMNS, Column, limited_by};
+use super::ledger::{COLUMNS, Column, slowed_by};
 use super::svg::escape;
 use crate::record::{CrossingLine, LogLine, Report, Summary};
+use crate::scenario::brief;
 use crate::table::number;
+use serde_json::Value;
 
 /// A table as HTML, without a head if that is empty; the cells are HTML already.
 pub(super) fn table(class: &str, head: &[String], rows: Vec<Vec<String>>) -> String {
@@ -65,11 +67,11 @@ pub(super) fn ledger(crossings: &[CrossingLine]) -> String {
         return "<p>No step was crossed.</p>\n".to_owned();
     }
     let names = COLUMNS.iter().map(|column| format!("{}<br>{}", column.name, column.unit));
-    let head = std::iter::once("step".to_owned()).chain(names).chain(["limited<br>by".to_owned()]);
+    let head = std::iter::once("step".to_owned()).chain(names).chain(["slowed<br>by".to_owned()]);
     let head: Vec<String> = head.collect();
     let rows = crossings.iter().map(|line| {
         let cells = COLUMNS.iter().map(|column| cell(column, line));
-        let by = limited_by(line).to_owned();
+        let by = slowed_by(line).to_owned();
         std::iter::once(line.index.to_string()).chain(cells).chain([by]).collect()
     });
     table("ledger", &head, rows.collect())
@@ -99,7 +101,7 @@ pub(super) fn reports(s: &Summary) -> String {
     }
     let rows = all.iter().map(|(kind, r)| {
         vec![
-            format!("{:.3} s", r.t_s),
+            format!("{} s", number(r.t_s, 3)),
             format!("<b class={kind}>{kind} {}</b>", r.code),
             escape(&r.text),
         ]
@@ -107,11 +109,22 @@ pub(super) fn reports(s: &Summary) -> String {
     injected + &table("lines", &[], rows.collect())
 }
 
+/// The parameters that differ from the preset's.
+pub(super) fn overrides(s: &Summary) -> String {
+    if s.overrides.is_empty() {
+        return "<p>Every parameter is the preset's.</p>\n".to_owned();
+    }
+    let row = |(key, value): (&String, &Value)| vec![escape(key), escape(&brief(value))];
+    "<p>Different from the preset:</p>\n".to_owned()
+        + &table("lines", &[], s.overrides.iter().map(row).collect())
+}
+
 pub(super) fn log(lines: &[LogLine]) -> String {
     if lines.is_empty() {
         return "<p>The log is empty.</p>\n".to_owned();
     }
-    let rows = lines.iter().map(|line| vec![format!("{:.3} s", line.t_s), escape(&line.text)]);
+    let rows =
+        lines.iter().map(|line| vec![format!("{} s", number(line.t_s, 3)), escape(&line.text)]);
     table("lines", &[], rows.collect())
 }
 

@@ -18,9 +18,9 @@ fn the_page_needs_no_other_file_and_is_small() {
 #[test]
 fn the_page_of_a_long_log_is_small_too() {
     let log = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/resets-3.mcap");
-    let recording = crate::record::recording(log.as_ref()).unwrap();
-    assert!(recording.rows.len() > 18_000);
-    let page = html(&recording, &[]);
+    let boots = crate::record::recordings(log.as_ref()).unwrap();
+    assert!(boots.iter().map(|boot| boot.rows.len()).sum::<usize>() > 18_000);
+    let page = log_html(&boots);
     assert!(page.len() < 2_000_000, "{} bytes", page.len());
 }
 
@@ -71,4 +71,32 @@ fn a_crossing_is_animated_from_the_rows_of_the_run() {
     for id in script.split("$(\"").skip(1).map(|rest| rest.split('"').next().unwrap()) {
         assert!(page.contains(&format!("id=\"{id}\"")), "{id}");
     }
+}
+
+#[test]
+fn the_times_of_a_page_count_from_the_command() {
+    let recording = example::faulted();
+    let commanded_s = recording.summary.commanded_s.expect("a command");
+    let since = recording.since_command();
+    let zero = since.log.iter().find(|line| line.text == "command: start").expect("it is logged");
+    assert!(zero.t_s.abs() < 2e-3, "{}", zero.t_s);
+    let first = (&since.rows[0].controller, &recording.rows[0].controller);
+    assert!((first.1.t_s - first.0.t_s - commanded_s).abs() < 1e-9);
+    let page = html(&recording, &[]);
+    assert!(page.contains("Time counts from the command."), "{page}");
+    let fault = recording.summary.faults[0].t_s - commanded_s;
+    assert!(page.contains(&format!("{fault:.3} s")) && !page.contains("-0.0,"), "no negative zero");
+}
+
+#[test]
+fn faults_limits_and_steps_are_marked_and_other_parameters_listed() {
+    let mut recording = example::faulted();
+    let page = html(&recording, &[]);
+    let is_marked = |page: &str, mark: &str| page.contains(&format!("\n{mark}\n</text>"));
+    assert!(is_marked(&page, "121") && is_marked(&page, "201"));
+    assert!(is_marked(&html(&example::deploy(), &[]), "step 1"));
+    assert!(page.contains("Every parameter is the preset's"));
+    recording.summary.overrides.insert("tread.tau_s".to_owned(), 0.2.into());
+    let page = html(&recording, &[]);
+    assert!(page.contains("<td>tread.tau_s</td><td>0.2</td>"));
 }

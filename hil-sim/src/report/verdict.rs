@@ -7,14 +7,17 @@ use crate::table::number;
 /// How a run went.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Grade {
-    /// It completed, with every gap within the reference and no gross slip.
+    /// It completed, with every gap within the tolerance of the reference and no gross slip.
     Good,
-    /// It completed, but a gap was larger than the reference or is unknown, or the wheel
-    /// slipped.
+    /// It completed, but a gap was larger or is unknown, or the wheel slipped.
     Fair,
     /// It did not complete or ended in a fault.
     Bad,
 }
+
+/// Part of the reference by which a gap of a good run may exceed it: what tolerances of the rig and
+/// errors of its sensors do to a crossing that is planned right.
+pub(crate) const GAP_TOLERANCE: f64 = 0.03;
 
 /// Gross slip from which a run no longer counts as free of slip, mm.
 pub(crate) const SLIP_SEEN_MM: f64 = 0.05;
@@ -25,11 +28,29 @@ pub(crate) fn reservations(summary: &Summary) -> Vec<&'static str> {
         return Vec::new();
     }
     let gap = match gap_excess(summary) {
-        Some(excess) if excess > 0.0 => Some("over the reference gap"),
+        Some(excess) if excess > GAP_TOLERANCE => Some("over the reference gap"),
         Some(excess) if excess.is_nan() => Some("gap unknown"),
         _ => None,
     };
     gap.into_iter().chain((slips(summary)).then_some("the wheel slipped")).collect()
+}
+
+/// Why a run has its grade, and what takes most time beside travel at cruise speed.
+pub(crate) fn verdict(summary: &Summary) -> String {
+    let why = match Grade::of(summary) {
+        Grade::Good if summary.gap_ref_mm > 0.0 => {
+            let most = 100.0 * GAP_TOLERANCE;
+            format!("good: every gap at most {most:.0} % over the reference, no slip")
+        }
+        Grade::Good => "good: no slip".to_owned(),
+        _ => reservations(summary).join(", "),
+    };
+    let slow = summary.lost.as_ref().map(|lost| format!("slow because {}", lost.main()));
+    [Some(why).filter(|why| !why.is_empty()), slow]
+        .into_iter()
+        .flatten()
+        .collect::<Vec<_>>()
+        .join("; ")
 }
 
 /// Whether the wheel slipped. What a log without truth measures includes creep and the steps'
@@ -61,7 +82,8 @@ impl Grade {
     pub(crate) fn of(summary: &Summary) -> Self {
         if !summary.completed || !summary.faults.is_empty() {
             Self::Bad
-        } else if gap_excess(summary).is_some_and(|excess| excess > 0.0 || excess.is_nan())
+        } else if gap_excess(summary)
+            .is_some_and(|excess| excess > GAP_TOLERANCE || excess.is_nan())
             || slips(summary)
         {
             Self::Fair
@@ -112,6 +134,9 @@ pub(crate) fn headline(summary: &Summary) -> String {
         (true, None) => format!("{verb} {travel}"),
         (true, Some(fault)) => {
             format!("{verb} {travel}, with fault {}: {}", fault.code, fault.text)
+        }
+        (false, None) if let Some(cause) = &summary.restart => {
+            format!("Restarted after {travel}: {cause}")
         }
         (false, None) if !summary.missing.is_empty() => format!("Log ends after {travel}"),
         (false, None) => format!("Did not complete: {travel}"),
@@ -186,9 +211,13 @@ mod tests {
     }
 
     #[test]
-    fn just_over_the_reference_has_its_grade_and_its_word() {
+    fn just_over_the_tolerance_of_the_reference_has_its_grade_and_its_word() {
         let mut summary = example::deploy().summary;
-        (summary.gap_ref_mm, summary.max_gap_mm) = (2.0, 2.000_001);
+        (summary.gap_ref_mm, summary.max_gap_mm) = (2.0, 2.059);
+        assert_eq!(Grade::of(&summary), Grade::Good);
+        assert!(verdict(&summary).starts_with("good: every gap at most 3 % over the reference"));
+        assert!(verdict(&summary).contains("; slow because "), "{}", verdict(&summary));
+        summary.max_gap_mm = 2.061;
         assert_eq!(Grade::of(&summary), Grade::Fair);
         assert_eq!(reservations(&summary), ["over the reference gap"]);
         summary.slip_mm = 0.2;

@@ -6,8 +6,7 @@ use serde_json::{Map, Value};
 use super::Axis;
 use crate::report::axis;
 use crate::report::palette;
-use crate::report::panel::{Line, Look, Panel};
-use crate::report::svg;
+use crate::report::panel::{Line, Look, Panel, stacked};
 use crate::scenario::brief;
 
 /// Size of a plot, CSS pixels.
@@ -53,32 +52,25 @@ pub fn picture(axes: &[Axis], rows: &[Map<String, Value>], plots: &[Plot]) -> Op
     let size = (SIZE.0, SIZE.1 * plots.len() as u32);
     // The text lives as long as the process, which ends after the picture.
     let x_name: &'static str = x.key.clone().leak();
-    Some(svg::fixed(size, |area| {
-        for (area, plot) in area.split_evenly((plots.len(), 1)).iter().zip(plots) {
-            let line = |(place, name): (usize, &String)| {
-                let own = rows.iter().filter(|row| group(row) == *name);
-                let mut points: Vec<(f64, f64)> =
-                    own.map(|row| (number(row, &x.key), number(row, plot.column))).collect();
-                points.sort_by(|a, b| a.0.total_cmp(&b.0));
-                let name = if name.is_empty() { plot.title } else { name };
-                let look = Look::Other(COLOURS[place % COLOURS.len()]);
-                Line { name: name.to_owned().into(), look, points }
-            };
-            let panel = Panel {
-                title: plot.title.to_owned(),
-                y_name: plot.y_name,
-                x_name: Some(x_name),
-                x: range,
-                y: None,
-                least_span: 0.0,
-                lines: names.iter().enumerate().map(line).collect(),
-                marks: Vec::new(),
-                levels: plot.level.iter().map(|(name, at)| (*name, Look::Limit, *at)).collect(),
-                shades: Vec::new(),
-                rules: Vec::new(),
-            };
-            panel.draw(area)?;
+    let panel = |plot: &Plot| {
+        let line = |(place, name): (usize, &String)| {
+            let own = rows.iter().filter(|row| group(row) == *name);
+            let mut points: Vec<(f64, f64)> =
+                own.map(|row| (number(row, &x.key), number(row, plot.column))).collect();
+            points.sort_by(|a, b| a.0.total_cmp(&b.0));
+            let name = if name.is_empty() { plot.title } else { name };
+            let look = Look::Other(COLOURS[place % COLOURS.len()]);
+            Line { name: name.to_owned().into(), look, points }
+        };
+        Panel {
+            title: plot.title.to_owned(),
+            y_name: plot.y_name,
+            x_name: Some(x_name),
+            x: range,
+            lines: names.iter().enumerate().map(line).collect(),
+            levels: plot.level.iter().map(|(name, at)| (*name, Look::Limit, *at)).collect(),
+            ..Panel::default()
         }
-        Ok(())
-    }))
+    };
+    Some(stacked(size, &mut plots.iter().map(panel).collect::<Vec<_>>()))
 }

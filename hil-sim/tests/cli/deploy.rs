@@ -85,7 +85,7 @@ fn files_go_to_the_given_directory_and_a_table_is_printed() {
     assert_eq!(code(&output), 0);
     let text = stdout(&output);
     assert!(text.starts_with("Deployed "), "{text}");
-    assert!(text.contains("wrote mine/run/report.html"), "{text}");
+    assert!(text.contains("wrote mine/run/: report.html"), "{text}");
     assert!(directory.path().join("mine/run/log.csv").is_file());
     assert!(!directory.path().join("out").exists());
 }

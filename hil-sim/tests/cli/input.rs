@@ -47,6 +47,22 @@ fn options_are_checked_by_name() {
         ("identify", &["<LOG>"]),
         ("identify missing.mcap", &["missing.mcap: No such file"]),
         ("identify --published notes.csv", &["cannot be used with"]),
+        ("identify --published --out a", &["--published", "--out", "cannot be used with"]),
+        ("capture --seconds nan", &["--seconds", "nan", "a number above 0"]),
+        ("capture --seconds -3", &["--seconds", "-3", "a number above 0"]),
+        ("capture --name ../x", &["--name ../x", "without a folder"]),
+        ("compare --controller limit", &["--controller limit", "no effect"]),
+        ("envelope --controller limit", &["--controller limit", "no effect"]),
+        ("sweep --crossing --controller limit", &["--controller limit", "no effect"]),
+        ("stress -n 1000000000", &["--cases <CASES>", "1000000000"]),
+        ("stress -n -1", &["--cases <CASES>", "'-1'"]),
+        ("stress --seed -1", &["--seed", "-1", "a whole number, 0 or more"]),
+        ("montecarlo -n -1", &["-n <N>", "'-1'"]),
+        ("montecarlo -n 2 --seed 9223372036854775807", &["run.seed = 9223372036854775807"]),
+        ("compare -n 2 --seed 9223372036854775807", &["run.seed = 9223372036854775807"]),
+        ("montecarlo -n 1 --shard 2/2", &["--shard 2/2", "none for this one"]),
+        ("faults --clean 1 --shard 2/2", &["--shard 2/2", "none for this one"]),
+        ("faults --only preload-sensor --shard 90/100", &["--shard 90/100", "none for this one"]),
     ] {
         refused(&arguments.split(' ').collect::<Vec<_>>(), names);
     }

@@ -106,6 +106,32 @@ fn comparisons_captures_and_identifications_keep_what_is_there() {
 }
 
 #[test]
+fn no_command_writes_over_what_it_reads() {
+    let directory = tempfile::tempdir().unwrap();
+    let at = directory.path();
+    good(at, &["deploy", "--out", "run"]);
+    std::fs::copy(at.join("run/log.mcap"), at.join("other.mcap")).unwrap();
+    let log = std::fs::read(at.join("other.mcap")).unwrap();
+    for arguments in [
+        "report other.mcap --out other.mcap",
+        "report run/log.mcap other.mcap --out other.mcap",
+        "report run/log.mcap other.mcap --out page.html --picture ./other.mcap",
+    ] {
+        let arguments: Vec<&str> = arguments.split(' ').collect();
+        refused_in(at, &arguments, &["other.mcap", "is read by this command"]);
+        assert!(log == std::fs::read(at.join("other.mcap")).unwrap(), "{arguments:?}");
+    }
+    good(at, &["params", "restore", "--file", "set.bin"]);
+    let set = std::fs::read(at.join("set.bin")).unwrap();
+    refused_in(at, &["params", "save", "set.bin", "--file", "set.bin"], &["save set.bin"]);
+    assert_eq!(set, std::fs::read(at.join("set.bin")).unwrap());
+    // A folder stands for the log in it.
+    let page = good(at, &["report", "run", "--json"]);
+    assert!(at.join("run/log.html").is_file(), "{}", stdout(&page));
+    refused_in(at, &["report", "."], &["./log.mcap: No such file"]);
+}
+
+#[test]
 fn a_run_without_a_crossing_has_no_gap() {
     let directory = tempfile::tempdir().unwrap();
     let at = directory.path();

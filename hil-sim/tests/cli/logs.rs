@@ -6,6 +6,8 @@ use hil_sim::scenario::Scenario;
 use hil_sim::session;
 use serde_json::Value;
 
+use crate::record::logs::data;
+
 use super::{code, good, number, object, refused_in, rig, rig_in, stderr, stdout};
 
 /// The frames of a deployment.
@@ -102,6 +104,53 @@ fn a_log_has_its_report_and_two_logs_their_comparison() {
     assert!(page("a/log.compare.html").contains("B - A"));
 }
 
+/// A capture with resets of the board in it: every start has its own clock and its own page.
+#[test]
+fn a_log_with_resets_is_shown_start_by_start() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let at = directory.path();
+    std::fs::copy(data("resets-1.mcap"), at.join("log.mcap")).expect("copied");
+    let found = object(&rig_in(at, &["report", "log.mcap", "--json"]));
+    let starts = found["starts"].as_array().unwrap_or_else(|| panic!("{found}"));
+    assert_eq!(starts.len(), 10);
+    let crossings = |of: &Value| of["crossings"].as_array().expect("a list").clone();
+    assert_eq!(starts.iter().map(|start| crossings(start).len()).sum::<usize>(), 8);
+    for start in starts {
+        let end = number(start, "total_s");
+        let mut before = 0.0;
+        for line in crossings(start) {
+            let [touch, lift] = ["touch_s", "lift_s"].map(|key| number(&line, key));
+            let first = touch.min(lift);
+            assert!(before < first && touch.max(lift) < end, "{line} in a start of {end} s");
+            assert!((touch - lift).abs() < 4.0, "{line}");
+            before = touch.max(lift);
+        }
+    }
+    let page = std::fs::read_to_string(at.join("log.html")).expect("a page");
+    assert!(page.contains("10 starts of the controller"));
+    assert_eq!(page.matches("Ended by a restart: ").count(), 9);
+    assert!(page.contains("<h2>Start 10 of 10</h2>"));
+    // The cause is the target's own word.
+    let cause = starts[0]["restart"].as_str().expect("a cause");
+    assert!(cause.contains("before: "), "{cause}");
+    assert!(starts[9]["restart"].is_null());
+    refused_in(at, &["report", "log.mcap", "log.mcap"], &["log.mcap: 10 starts"]);
+}
+
+/// The log's line of a crossing and the ledger's have one lead.
+#[test]
+fn a_lead_has_one_meaning_on_a_page() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let output = rig_in(directory.path(), &["deploy", "--out", "run", "--log", "--json"]);
+    let (found, log) = (object(&output), stderr(&output));
+    let mut logged = log.lines().filter(|line| line.contains("] crossing "));
+    for line in found["crossings"].as_array().expect("a list") {
+        let logged = logged.next().expect("a line of the crossing");
+        let lead = format!("lead {:.2} s", number(line, "lead_time_s"));
+        assert!(logged.contains(&lead), "{lead}: {logged}");
+    }
+}
+
 #[test]
 fn a_view_without_terminal_ends_by_itself() {
     let output = rig(&["live", "--headless", "--fast", "--listen", "127.0.0.1:0"]);
@@ -114,7 +163,7 @@ fn a_view_records_what_it_shows() {
     let view = ["live", "--headless", "--fast", "--listen", "127.0.0.1:0", "--record", "kept"];
     let output = rig_in(directory.path(), &[&view[..], &["--set", "tread.tau_s=0.11"]].concat());
     assert_eq!(code(&output), 0, "{}", stderr(&output));
-    assert!(stdout(&output).contains("wrote kept/log.mcap"), "{}", stdout(&output));
+    assert!(stdout(&output).contains("wrote kept/: log.mcap"), "{}", stdout(&output));
     let replayed = rig_in(directory.path(), &["replay", "kept/log.mcap", "kept/log.csv", "--json"]);
     let replayed = object(&replayed);
     assert_eq!(replayed["equal"], true, "{replayed}");

@@ -5,7 +5,7 @@ mod hidden;
 
 use std::collections::BTreeMap;
 
-use crate::cli::{code, object, rig_in, stderr};
+use crate::cli::{code, object, refused_in, rig_in, stderr};
 use hidden::Line;
 use hil_sim::identify::published::{self, AMPLITUDE_MM};
 use hil_sim::scenario::Scenario;
@@ -70,6 +70,51 @@ fn three_published_gaps_are_met_as_far_as_the_ring_can() {
     assert!((ratios[1] - 1.0).abs() < 1e-6, "{held:?}");
     assert!(ratios.iter().all(|ratio| (0.9..1.1).contains(ratio)), "{held:?}");
     assert!(square(&held) < square(&stated) && square(&held) > square(&fitted));
+}
+
+/// Logs of two rigs gave a friction between both with a narrow interval.
+#[test]
+fn logs_of_two_rigs_are_refused_and_the_odd_one_is_named() {
+    let directory = tempfile::tempdir().unwrap();
+    let at = directory.path();
+    let log = |name: &str, more: &[&str]| {
+        let output = rig_in(at, &[&["deploy", "--out", name], more].concat());
+        assert_eq!(code(&output), 0, "{}", stderr(&output));
+        format!("{name}/log.mcap")
+    };
+    let light = ["--controller", "constant", "--set", "preload.cruise_n=25"];
+    let one = log("one", &["--seed", "9"]);
+    let of_one = log("of-one", &[&["--seed", "9"], &light[..]].concat());
+    let odd = log("odd", &["--seed", "4"]);
+    refused_in(at, &["identify", &one, &of_one, &odd], &["odd/log.mcap: not of the rig"]);
+    refused_in(at, &["identify", &one, &odd], &["not of the rig of the other logs"]);
+    // The same sleeve, less friction.
+    let smooth = log("smooth", &["--set", "plant.mu=0.85"]);
+    let nominal = log("nominal", &[]);
+    refused_in(at, &["identify", &nominal, &smooth], &["not of the rig of the other logs"]);
+    let output = rig_in(at, &["identify", &one, &of_one]);
+    assert_eq!(code(&output), 0, "{}", stderr(&output));
+}
+
+#[test]
+fn a_log_that_lacks_something_is_identified_with_a_word_and_exit_code_1() {
+    let directory = tempfile::tempdir().unwrap();
+    let at = directory.path();
+    assert_eq!(code(&rig_in(at, &["deploy", "--out", "run"])), 0);
+    let bytes = std::fs::read(at.join("run/log.mcap")).unwrap();
+    std::fs::write(at.join("cut.mcap"), &bytes[..bytes.len() * 9 / 10]).unwrap();
+    let table = std::fs::read_to_string(at.join("run/log.csv")).unwrap();
+    let lossy: Vec<&str> =
+        table.lines().enumerate().filter(|(n, _)| *n != 3000).map(|(_, line)| line).collect();
+    std::fs::write(at.join("lossy.csv"), lossy.join("\n") + "\n").unwrap();
+    let described = std::fs::read(at.join("run/log.csv-metadata.json")).unwrap();
+    std::fs::write(at.join("lossy.csv-metadata.json"), described).unwrap();
+    for (log, what) in [("cut.mcap", "cut off"), ("lossy.csv", "1 ticks are missing")] {
+        let output = rig_in(at, &["identify", log, "--json"]);
+        assert_eq!(code(&output), 1, "{log}: {}", stderr(&output));
+        let notes = object(&output)["notes"].to_string();
+        assert!(notes.contains(&format!("{log}: ")) && notes.contains(what), "{notes}");
+    }
 }
 
 #[test]

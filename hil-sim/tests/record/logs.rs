@@ -28,7 +28,7 @@ use serde_json::Value;
 const POSITION_MM: f64 = 0.8;
 const PRELOAD_N: f64 = 1.0;
 
-pub(super) fn data(name: &str) -> PathBuf {
+pub(crate) fn data(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(name)
 }
 

@@ -2,4 +2,4 @@
 
 mod fixtures;
 mod fuzz;
-mod logs;
+pub(crate) mod logs;

@@ -10,6 +10,10 @@ use hil_sim::session::{Options, run};
 use hil_sim::testing::long;
 use rayon::prelude::*;
 
+/// The preload is reached within this part of its reference: the controller's tolerance of
+/// the measured preload, and three standard deviations of the sensor.
+const REACHED_PART: f64 = 0.035;
+
 /// A run and its scenario.
 struct Run {
     name: String,
@@ -134,7 +138,7 @@ fn steps_of_any_height_and_place_are_found_where_they_are() {
 
 #[test]
 fn gaps_stay_near_the_reference_with_the_preload_reached_before_every_corner() {
-    for Run { name, scenario, summary, nominal, .. } in RUNS.iter() {
+    for Run { name, scenario, summary, rows, nominal } in RUNS.iter() {
         // At the study's loads the gap is two thirds as large, and the same tolerances of
         // sleeve and tread weigh more: of a thousand drawn rigs the worst is 7 % above.
         // There the measured gap is up to 5 % high, and the schedule keeps as much more below.
@@ -146,12 +150,18 @@ fn gaps_stay_near_the_reference_with_the_preload_reached_before_every_corner() {
         for line in &summary.crossings {
             let part = line.gap_mm / summary.gap_ref_mm;
             assert!(range.contains(&part), "{name} step {}: {part}", line.index);
-            let lead = line.lead_time_s.expect("known in software");
+            assert!(line.lead_time_s.is_some(), "{name}: the controller reports it");
+            let touch = (1e3 * line.touch_s) as usize;
+            let reached = |row: &Tick| {
+                let wanted = row.controller.preload_ref_n;
+                row.truth.expect("truth").preload_true_n >= wanted * (1.0 - REACHED_PART)
+            };
             // To the first step the wheel rolls while the preload builds, and lifts off once it
             // has about that with which the plan builds up, 0.88 of cruise.
             let first = line.index == 1 && name.contains("deploy");
             let enough = line.preload_n > 0.85 * scenario.rig.preload.cruise_n;
-            assert!(if first { enough } else { lead > 0.0 }, "{name}: {line:?}");
+            let has_lead = rows[touch - 1..=touch].iter().all(reached);
+            assert!(if first { enough } else { has_lead }, "{name}: {line:?}");
         }
         if *nominal && summary.rig == "prototype" {
             let worst = summary.crossings.iter().map(|line| line.gap_mm).fold(0.0, f64::max);

@@ -66,10 +66,15 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     }
     let printed = Printed { summary, account: &ran.load, missed: &missed, files: &files };
     output::result(args.json, &printed, || {
-        terminal::run(summary, &files) + &ran.load.text(&missed)
+        terminal::run(summary, &files, args.verbose) + &ran.load.text(&missed)
     })?;
-    let clean = ran.load.unmodelled.is_empty();
-    Ok(Outcome::of(summary.completed && summary.faults.is_empty() && clean))
+    Ok(outcome(summary, &ran.load))
+}
+
+/// A run is good that arrives without a fault, keeps to the chip's rules and to every budget.
+fn outcome(summary: &Summary, load: &Load) -> Outcome {
+    let clean = load.unmodelled.is_empty() && load.missed().is_empty();
+    Outcome::of(summary.completed && summary.faults.is_empty() && clean)
 }
 
 /// The plant not at the board's pins, but in the loop over its debug probe.
@@ -82,4 +87,30 @@ fn in_the_loop(
     let mut port = EmulatedPort::new(&elf).map_err(Failure::run)?;
     run::store(port.machine_mut(), scenario).map_err(Failure::run)?;
     looped::close(args, &mut port, scenario, directory, "board")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::load::Cost;
+
+    #[test]
+    fn a_budget_that_is_missed_fails_the_run() {
+        let summary = Summary { completed: true, ..Summary::default() };
+        let load = |load| Load {
+            clock_hz: 170_000_000,
+            cycles: 1,
+            load,
+            load_with_waits: None,
+            tick: Cost::default(),
+            stack_used: 1,
+            stack: 8192,
+            flash: 1,
+            ram: 1,
+            unmodelled: Vec::new(),
+        };
+        assert_eq!(outcome(&summary, &load(0.05)), Outcome::Good);
+        assert_eq!(outcome(&summary, &load(0.5)), Outcome::Bad);
+        assert_eq!(outcome(&Summary::default(), &load(0.05)), Outcome::Bad);
+    }
 }

@@ -23,7 +23,9 @@ pub(super) struct Trace {
     /// The plant before each millisecond.
     truths: Vec<Truth>,
     log: Vec<LogLine>,
-    /// Millisecond of the current start's first tick, and its last tick.
+    /// Milliseconds of the board's latest start and of the one that the log has come to, and the
+    /// last tick.
+    latest: u32,
     start: u32,
     last: u32,
 }
@@ -36,6 +38,7 @@ impl Trace {
             events: VecDeque::new(),
             truths: vec![*plant.truth()],
             log: Vec::new(),
+            latest: 0,
             start: 0,
             last: 0,
         }
@@ -46,18 +49,23 @@ impl Trace {
         self.ticks.back().is_some_and(|(.., tick)| matches!(tick.mode, COMPLETE | FAULT_HOLD))
     }
 
-    /// Adds a millisecond that ended with the plant in `truth`.
-    pub(super) fn add(&mut self, frames: &[u8], lines: &[Line], truth: &Truth) {
+    /// Adds a millisecond that ended with the plant in `truth`, and in which the board may have
+    /// restarted.
+    pub(super) fn add(&mut self, frames: &[u8], lines: &[Line], truth: &Truth, restarted: bool) {
         let now = self.truths.len() as u32;
-        let Self { decoder, ticks, events, start, last, .. } = self;
+        if restarted {
+            self.latest = now;
+        }
+        let Self { decoder, ticks, events, latest, start, last, .. } = self;
         decoder.read(frames, &mut |item| match item {
             Item::Tick(record, codes) => {
                 let at = record.telemetry.at;
                 if at < *last {
-                    *start = now.saturating_sub(at);
+                    *start = *latest;
                 }
                 *last = at;
-                let columns = Controller::of(&record, &codes);
+                let mut columns = Controller::of(&record, &codes);
+                columns.t_s += f64::from(*start) * 1e-3;
                 ticks.push_back((*start + at, record.telemetry, columns));
             }
             Item::Event(entry) => events.push_back((*start + entry.at, entry)),
