@@ -21,6 +21,7 @@ use serde::{Deserialize, Serialize};
 use crate::probe::PortError;
 use crate::scenario::Scenario;
 
+pub use figures::stowed;
 pub use line::Line;
 pub use operator::{Action, Operator, Question, Seen, Sensor, Stdin};
 pub use page::html;

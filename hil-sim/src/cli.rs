@@ -6,6 +6,7 @@
 //! line.
 
 pub mod bringup;
+pub mod campaign;
 pub mod capture;
 mod compare;
 mod completions;
@@ -19,6 +20,7 @@ mod identify;
 mod keys;
 pub mod live;
 mod log_files;
+mod merge;
 mod montecarlo;
 pub mod output;
 pub mod params;
@@ -40,6 +42,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 
 use crate::provision::{self, Extra};
+use campaign::CampaignArgs;
 use failure::{Failure, Outcome};
 
 /// Virtual rig for a rubber-wheeled drive that climbs the steps of a telescoping
@@ -68,6 +71,7 @@ enum Verb {
     Flash(flash::Args),
     Identify(identify::Args),
     Keys(keys::Args),
+    Merge(merge::Args),
     Params(params::Args),
     Stress(stress::Args),
     Sweep(sweep::Args),
@@ -90,6 +94,19 @@ struct Passed {
 }
 
 impl Verb {
+    /// How the verb runs its campaign, if it has one.
+    fn campaign(&mut self) -> Option<&mut CampaignArgs> {
+        match self {
+            Self::Compare(args) => Some(&mut args.campaign),
+            Self::Envelope(args) => Some(&mut args.campaign),
+            Self::Faults(args) => Some(&mut args.campaign),
+            Self::Montecarlo(args) => Some(&mut args.campaign),
+            Self::Stress(args) => Some(&mut args.campaign),
+            Self::Sweep(args) => Some(&mut args.campaign),
+            _ => None,
+        }
+    }
+
     fn run(&self) -> Result<Outcome, Failure> {
         match self {
             Self::Deploy(args) => deploy::run(args),
@@ -107,6 +124,7 @@ impl Verb {
             Self::Flash(args) => flash::run(args),
             Self::Identify(args) => identify::run(args),
             Self::Keys(args) => keys::run(args),
+            Self::Merge(args) => merge::run(args),
             Self::Params(args) => params::run(args),
             Self::Stress(args) => stress::run(args),
             Self::Sweep(args) => sweep::run(args),

@@ -7,14 +7,15 @@ mod tuning;
 use interstage::model::Planner;
 use interstage::units::Direction;
 use rayon::prelude::*;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
+use crate::campaign::Campaign;
 use crate::montecarlo::{self, RunLine};
 use crate::oracle::{self, Bounds};
 use crate::scenario::{ControllerKind, Scenario};
 use crate::session::RunError;
 
-pub use tuning::MOST_TRIES;
+use tuning::MOST_TRIES;
 
 /// The strategies, the one that the others are compared with first.
 pub const STRATEGIES: [ControllerKind; 4] = [
@@ -28,10 +29,10 @@ pub const STRATEGIES: [ControllerKind; 4] = [
 pub const ORACLE: &str = "oracle";
 
 /// One strategy over all rigs.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Entry {
     /// Strategy, or [`ORACLE`].
-    pub controller: &'static str,
+    pub controller: String,
     /// Part of the reference gap by which the planner's own one is below it; the tuning. None for
     /// the oracle.
     pub gap_reserve: Option<f64>,
@@ -56,7 +57,7 @@ pub struct Entry {
 
 impl Entry {
     /// The entry of these runs.
-    fn of(controller: &'static str, gap_reserve: Option<f64>, lines: &[RunLine]) -> Self {
+    fn of(controller: &str, gap_reserve: Option<f64>, lines: &[RunLine]) -> Self {
         let completed = || lines.iter().filter(|line| line.completed);
         let mean = |of: &dyn Fn(&RunLine) -> Option<f64>| {
             let values: Vec<f64> = completed().filter_map(of).collect();
@@ -66,7 +67,7 @@ impl Entry {
         let gaps = gaps.filter(|gap| gap.is_finite());
         let margins = lines.iter().filter_map(|line| line.least_slip_margin);
         Self {
-            controller,
+            controller: controller.to_owned(),
             gap_reserve,
             tuned: false,
             duration_s: mean(&|line| line.duration_s),
@@ -80,23 +81,32 @@ impl Entry {
     }
 }
 
+/// A strategy over all rigs and, behind the scheduled one, the oracle.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Compared {
+    entry: Entry,
+    oracle: Option<Entry>,
+    /// Seeds of plants for which the oracle found no run, and which bound it could not keep.
+    oracle_fails: Vec<(u64, String)>,
+}
+
 /// A comparison.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize)]
 pub struct Comparison {
     /// Rigs drawn.
     pub runs: usize,
     /// Reference gap, mm.
     pub gap_ref_mm: f64,
-    /// The strategies, all held to the same worst gap: the scheduled one first.
+    /// The strategies, all held to the same worst gap, the scheduled one first; then the oracle.
     pub entries: Vec<Entry>,
     /// Seeds of plants for which the oracle found no run, and which bound it could not keep.
+    #[serde(skip)]
     pub oracle_fails: Vec<(u64, String)>,
-    /// Runs of the scheduled strategy behind its entry, in the order of the seeds.
-    scheduled: Vec<RunLine>,
 }
 
-/// Compares over `runs` rigs of the scenario, seeds `first_seed` and up. `progress` is
-/// called after every run.
+/// The campaign that compares the strategies over the rigs of these seeds, with the oracle if
+/// it has an `effort`: on each plant the best run within the worst gap and the least slip
+/// margin of the scheduled run there.
 ///
 /// Every strategy has the same planner: it rolls while the preload builds, brakes late, keeps
 /// the same friction check and aims at a gap that lies below the reference by a reserve. The
@@ -105,74 +115,51 @@ pub struct Comparison {
 ///
 /// # Errors
 /// [`RunError`] if the parameters do not make a rig.
-pub fn compare(
+pub fn campaign(
     scenario: &Scenario,
-    first_seed: u64,
-    runs: usize,
-    progress: &(dyn Fn() + Sync),
-) -> Result<Comparison, RunError> {
+    seeds: Vec<u64>,
+    effort: Option<oracle::Effort>,
+) -> Result<Campaign<'_, ControllerKind, Compared, Comparison, RunError>, RunError> {
     let direction: Direction = scenario.run.direction.into();
     let reference = Planner::try_build(&scenario.rig)?.gap_ref(direction).to_num::<f64>();
-    let seeds: Vec<u64> = (first_seed..).take(runs).collect();
-    let mut comparison = Comparison {
-        runs,
-        gap_ref_mm: reference,
-        entries: Vec::new(),
-        oracle_fails: Vec::new(),
-        scheduled: Vec::new(),
-    };
-    for kind in STRATEGIES {
+    let runs = seeds.len();
+    let run = move |kind: &ControllerKind, done: &(dyn Fn() + Sync)| {
         let (entry, lines) = tuning::tune(reference, |reserve| {
             let mut scenario = scenario.clone();
-            scenario.run.controller = kind;
+            scenario.run.controller = *kind;
             // Not the rig's own reserve: the crossings earn that back.
             scenario.rig.control.gap_ref_mm = reference * (1.0 - reserve);
-            let lines = montecarlo::run(&scenario, &seeds, progress)?;
+            let lines = montecarlo::campaign(&scenario, seeds.clone()).complete(done)?;
             Ok((Entry::of(kind.name(), Some(reserve), &lines), lines))
         })?;
-        if kind == ControllerKind::Scheduled {
-            comparison.scheduled = lines;
-        }
-        comparison.entries.push(entry);
-    }
-    Ok(comparison)
-}
-
-/// Most runs that [`compare`] makes over so many rigs, for a progress bar.
-#[must_use]
-pub fn most_runs(rigs: usize) -> usize {
-    rigs * STRATEGIES.len() * MOST_TRIES
-}
-
-impl Comparison {
-    /// Adds the oracle: on each plant the best run within the worst gap and the least slip
-    /// margin of the scheduled run there. `progress` is called after every plant.
-    ///
-    /// # Errors
-    /// [`RunError`] if a plant fails.
-    pub fn add_oracle(
-        &mut self,
-        scenario: &Scenario,
-        effort: oracle::Effort,
-        progress: &(dyn Fn() + Sync),
-    ) -> Result<(), RunError> {
-        let reference = self.gap_ref_mm;
-        let lines = self
-            .scheduled
-            .par_iter()
-            .map(|line| {
+        let mut compared = Compared { entry, oracle: None, oracle_fails: Vec::new() };
+        if let Some(effort) = effort.filter(|_| *kind == ControllerKind::Scheduled) {
+            let best = |line: &RunLine| {
                 let mut scenario = scenario.clone();
                 scenario.run.seed = line.seed;
                 let found = oracle::search(&scenario, &Bounds::of(line, reference), effort);
-                progress();
+                done();
                 found.map(|run| run.line)
-            })
-            .collect::<Result<Vec<_>, _>>()?;
-        let fails = |line: &RunLine| Some((line.seed, line.error.clone()?));
-        self.oracle_fails = lines.iter().filter_map(fails).collect();
-        self.entries.push(Entry { tuned: true, ..Entry::of(ORACLE, None, &lines) });
-        Ok(())
-    }
+            };
+            let lines = lines.par_iter().map(best).collect::<Result<Vec<_>, _>>()?;
+            let fails = |line: &RunLine| Some((line.seed, line.error.clone()?));
+            compared.oracle_fails = lines.iter().filter_map(fails).collect();
+            compared.oracle = Some(Entry { tuned: true, ..Entry::of(ORACLE, None, &lines) });
+        }
+        Ok(compared)
+    };
+    let fold = move |lines: Vec<(ControllerKind, Compared)>| {
+        let oracle = lines.iter().find_map(|(_, line)| line.oracle.clone());
+        let fails = lines.iter().flat_map(|(_, line)| line.oracle_fails.clone()).collect();
+        let entries = lines.into_iter().map(|(_, line)| line.entry).chain(oracle).collect();
+        Comparison { runs, gap_ref_mm: reference, entries, oracle_fails: fails }
+    };
+    Ok(Campaign {
+        steps: ("runs at most", runs * MOST_TRIES),
+        cases: STRATEGIES.to_vec(),
+        run: Box::new(run),
+        fold: Box::new(fold),
+    })
 }
 
 #[cfg(test)]
@@ -188,11 +175,12 @@ mod tests {
             runs.fetch_add(1, Ordering::Relaxed);
         };
         let scenario = Scenario::default();
-        let mut comparison = compare(&scenario, 1, 1, &count).unwrap();
+        let campaign = campaign(&scenario, vec![1], Some(oracle::Effort::Coarse)).unwrap();
+        let most = campaign.steps.1 * campaign.cases.len();
+        let comparison = campaign.complete(&count).unwrap();
         let runs = runs.into_inner();
-        assert!((STRATEGIES.len()..=most_runs(1)).contains(&runs), "{runs}");
-        comparison.add_oracle(&scenario, oracle::Effort::Coarse, &|| {}).unwrap();
-        let names: Vec<_> = comparison.entries.iter().map(|entry| entry.controller).collect();
+        assert!((STRATEGIES.len()..=most).contains(&runs), "{runs}");
+        let names: Vec<_> = comparison.entries.iter().map(|entry| &*entry.controller).collect();
         assert_eq!(names, ["scheduled", "constant", "limit", "reactive", "oracle"]);
         for entry in &comparison.entries {
             let off = entry.worst_gap_mm.unwrap() / comparison.gap_ref_mm - 1.0;

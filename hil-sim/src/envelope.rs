@@ -6,9 +6,9 @@ mod grid;
 mod picture;
 
 use interstage::model::Planner;
-use rayon::prelude::*;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
+use crate::campaign::Campaign;
 use crate::compare::STRATEGIES;
 use crate::report::verdict::SLIP_SEEN_MM;
 use crate::scenario::{ControllerKind, Scenario};
@@ -18,7 +18,7 @@ pub use grid::{Grid, GridError};
 pub use picture::picture;
 
 /// One strategy at one place of the grid.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Cell {
     /// Friction of tread on wall.
     pub friction: f64,
@@ -27,7 +27,7 @@ pub struct Cell {
     /// Whether the controller knows both; else it believes the scenario's.
     pub known: bool,
     /// Strategy.
-    pub controller: &'static str,
+    pub controller: ControllerKind,
     /// Whether the drive reached the end of travel with every step crossed and no fault.
     pub completed: bool,
     /// Gross slip, mm; none if no run could be made.
@@ -71,7 +71,7 @@ pub struct Envelope {
 
 impl Envelope {
     /// Part of the grid in which this strategy completes without slip.
-    pub fn area(&self, controller: &str) -> Area {
+    pub fn area(&self, controller: ControllerKind) -> Area {
         let part = |known: bool| {
             let of = |cell: &&Cell| cell.controller == controller && cell.known == known;
             let all = self.cells.iter().filter(of);
@@ -84,7 +84,7 @@ impl Envelope {
     /// The cells in which another strategy completes without slip and the scheduled one does
     /// not; none if its region contains those of the others.
     pub fn not_contained(&self) -> Vec<&Cell> {
-        let scheduled = |cell: &Cell| cell.controller == ControllerKind::Scheduled.name();
+        let scheduled = |cell: &Cell| cell.controller == ControllerKind::Scheduled;
         let lacks = |cell: &&Cell| {
             self.cells.iter().any(|own| scheduled(own) && own.same_place(cell) && !own.good())
         };
@@ -93,14 +93,14 @@ impl Envelope {
 
     /// Mean of this strategy's time over the scheduled one's, in the cells where both complete
     /// without slip; none without such a cell.
-    pub(crate) fn time_ratio(&self, controller: &str, known: bool) -> Option<f64> {
+    pub(crate) fn time_ratio(&self, controller: ControllerKind, known: bool) -> Option<f64> {
         let good = || self.cells.iter().filter(move |cell| cell.known == known && cell.good());
-        let of = |cell: &Cell, name: &str| cell.controller == name;
+        let of = |cell: &Cell, kind| cell.controller == kind;
         let ratios: Vec<f64> = good()
             .filter(|cell| of(cell, controller))
             .filter_map(|cell| {
-                let name = ControllerKind::Scheduled.name();
-                let own = good().find(|own| of(own, name) && own.same_place(cell))?;
+                let scheduled = ControllerKind::Scheduled;
+                let own = good().find(|own| of(own, scheduled) && own.same_place(cell))?;
                 Some(cell.duration_s? / own.duration_s?)
             })
             .collect();
@@ -108,35 +108,38 @@ impl Envelope {
     }
 }
 
-/// Runs every strategy at every place of the grid, on the plant of the scenario's seed with
-/// that friction and load; `progress` is called after every run.
-pub fn envelope(
+/// Known or not, friction, load, N, and strategy.
+type Place = (bool, f64, f64, ControllerKind);
+
+/// The campaign of every strategy at every place of the grid, on the plant of the scenario's seed
+/// with that friction and load.
+pub fn campaign(
     scenario: &Scenario,
     grid: Grid,
-    progress: &(dyn Fn() + Sync),
-) -> Result<Envelope, RunError> {
+) -> Result<Campaign<'_, Place, Cell, Envelope, RunError>, RunError> {
     Planner::try_build(&scenario.rig)?;
     scenario.plant().check(scenario.rig.preload.limit_n)?;
     let (frictions, loads_n) = (grid.frictions(), grid.loads_n());
-    let mut places = Vec::new();
+    let mut cases = Vec::new();
     for known in [true, false] {
         for &friction in &frictions {
             for &load_n in &loads_n {
-                places.extend(STRATEGIES.map(|kind| (known, friction, load_n, kind)));
+                cases.extend(STRATEGIES.map(|kind| (known, friction, load_n, kind)));
             }
         }
     }
-    let cells = places
-        .into_par_iter()
-        .map(|(known, friction, load_n, kind)| {
-            let cell = cell(scenario, known, friction, load_n, kind);
-            progress();
-            cell
-        })
-        .collect();
+    let run = |&(known, friction, load_n, kind): &Place, done: &(dyn Fn() + Sync)| {
+        let cell = cell(scenario, known, friction, load_n, kind);
+        done();
+        Ok(cell)
+    };
     let loads = &scenario.rig.plant;
     let nominal = (loads.mu, loads.top_load_n * loads.top_load_share);
-    Ok(Envelope { frictions, loads_n, nominal, cells })
+    let fold = move |lines: Vec<(Place, Cell)>| {
+        let cells = lines.into_iter().map(|(_, cell)| cell).collect();
+        Envelope { frictions, loads_n, nominal, cells }
+    };
+    Ok(Campaign { steps: ("runs", 1), cases, run: Box::new(run), fold: Box::new(fold) })
 }
 
 fn cell(
@@ -167,7 +170,7 @@ fn cell(
         friction,
         load_n,
         known,
-        controller: kind.name(),
+        controller: kind,
         completed,
         slip_mm: summary.as_ref().map(|summary| summary.slip_mm),
         duration_s: summary.and_then(|summary| summary.duration_s).filter(|_| completed),
@@ -179,9 +182,10 @@ mod tests {
     use std::sync::atomic::{AtomicUsize, Ordering};
 
     use super::*;
+    use ControllerKind::{Limit, Scheduled};
 
     /// A cell that completed without slip in this time, or did not.
-    fn made(controller: &'static str, friction: f64, duration_s: Option<f64>) -> Cell {
+    fn made(controller: ControllerKind, friction: f64, duration_s: Option<f64>) -> Cell {
         Cell {
             friction,
             load_n: 5.0,
@@ -196,12 +200,12 @@ mod tests {
     #[test]
     fn areas_times_and_what_is_not_contained() {
         let mut cells = vec![
-            made("scheduled", 0.6, None),
-            made("scheduled", 0.9, Some(5.0)),
-            made("scheduled", 1.2, Some(4.0)),
-            made("limit", 0.6, Some(9.0)),
-            made("limit", 0.9, Some(6.0)),
-            made("limit", 1.2, Some(4.0)),
+            made(Scheduled, 0.6, None),
+            made(Scheduled, 0.9, Some(5.0)),
+            made(Scheduled, 1.2, Some(4.0)),
+            made(Limit, 0.6, Some(9.0)),
+            made(Limit, 0.9, Some(6.0)),
+            made(Limit, 1.2, Some(4.0)),
         ];
         let nominal = (1.1, 6.7);
         let envelope = |cells: &[Cell]| Envelope {
@@ -211,12 +215,12 @@ mod tests {
             cells: cells.to_vec(),
         };
         let all = envelope(&cells);
-        assert_eq!(all.area("scheduled"), Area { known: 2.0 / 3.0, unknown: 0.0 });
-        assert_eq!(all.area("limit").known, 1.0);
+        assert_eq!(all.area(Scheduled), Area { known: 2.0 / 3.0, unknown: 0.0 });
+        assert_eq!(all.area(Limit).known, 1.0);
         let missing: Vec<f64> = all.not_contained().iter().map(|cell| cell.friction).collect();
         assert_eq!(missing, [0.6]);
-        assert!((all.time_ratio("limit", true).unwrap() - 1.1).abs() < 1e-12);
-        assert_eq!(all.time_ratio("limit", false), None);
+        assert!((all.time_ratio(Limit, true).unwrap() - 1.1).abs() < 1e-12);
+        assert_eq!(all.time_ratio(Limit, false), None);
         // With slip it has not done it.
         cells[3].slip_mm = Some(1.0);
         assert!(envelope(&cells).not_contained().is_empty());
@@ -228,14 +232,14 @@ mod tests {
         let progress = || {
             count.fetch_add(1, Ordering::Relaxed);
         };
+        let scenario = Scenario::default();
         let grid: Grid = "2x2".parse().unwrap();
-        let found = envelope(&Scenario::default(), grid, &progress).unwrap();
+        let found = campaign(&scenario, grid).unwrap().complete(&progress).unwrap();
         assert_eq!((found.cells.len(), count.into_inner()), (32, 32));
-        assert_eq!(grid.runs(), 32);
         let cell = |known, friction, load_n| {
             let at = |cell: &&Cell| {
                 (cell.known, cell.friction, cell.load_n) == (known, friction, load_n)
-                    && cell.controller == "scheduled"
+                    && cell.controller == ControllerKind::Scheduled
             };
             found.cells.iter().find(at).expect("a cell of the grid").clone()
         };

@@ -2,6 +2,7 @@
 //! reports on them.
 
 pub mod bringup;
+pub mod campaign;
 pub mod cli;
 pub mod compare;
 pub mod envelope;

@@ -2,23 +2,21 @@
 
 mod drawn;
 mod outcome;
-mod shard;
 
 use interstage::fault::Limit;
-use rayon::prelude::*;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
-use crate::record::{CrossingLine, Report, Summary};
+use crate::campaign::Campaign;
+use crate::record::{CrossingLine, Report, Summary, or_nan};
 use crate::report::verdict::SLIP_SEEN_MM;
 use crate::scenario::Scenario;
-use crate::session::{self, LONGEST_S, Options, RunError};
+use crate::session::{self, Options, RunError};
 
 pub use drawn::Drawn;
 pub use outcome::{Least, LimitCount, Outcome, Quantiles, SeedReport, StepFound};
-pub use shard::{Shard, ShardError};
 
 /// The result of one run.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct RunLine {
     /// Seed of the plant.
     pub seed: u64,
@@ -29,6 +27,7 @@ pub struct RunLine {
     /// From the start of motion to its end, s.
     pub moving_s: f64,
     /// Largest gap at a step, or separation elsewhere, mm.
+    #[serde(deserialize_with = "or_nan")]
     pub max_gap_mm: f64,
     /// The same over the reference gap; none without reference.
     pub gap_over_ref: Option<f64>,
@@ -53,6 +52,7 @@ pub struct RunLine {
     /// Least of the plant's friction less the utilisation at its peak in a crossing.
     pub least_slip_margin: Option<f64>,
     /// Mean true preload while moving, N.
+    #[serde(deserialize_with = "or_nan")]
     pub mean_preload_n: f64,
     /// Faults.
     pub faults: Vec<Report>,
@@ -67,7 +67,6 @@ pub struct RunLine {
 impl RunLine {
     /// The line of a finished run on a plant with friction `mu`, commanded to travel this far,
     /// mm.
-    #[must_use]
     pub fn new(summary: Summary, mu: f64, travel_mm: f64) -> Self {
         let crossings = &summary.crossings;
         let least = |values: &mut dyn Iterator<Item = f64>| values.min_by(f64::total_cmp);
@@ -79,7 +78,7 @@ impl RunLine {
         let referred = summary.gap_ref_mm > 0.0;
         let completed = summary.completed && summary.faults.is_empty();
         let reported = !summary.faults.is_empty() || limits.iter().any(|code| reports_end(*code));
-        let called_complete = summary.faults.is_empty() && summary.total_s < LONGEST_S;
+        let called_complete = summary.faults.is_empty() && summary.cut_off_s.is_none();
         let found = |c: &CrossingLine| Some((c.index, (c.step_found_mm? - c.step_mm).abs()));
         Self {
             seed: summary.seed,
@@ -139,32 +138,27 @@ fn opened_wide(summary: &Summary) -> bool {
 }
 
 /// Crossings with gross slip; a run that slipped only elsewhere counts as one.
-#[must_use]
 pub fn slip_events(summary: &Summary) -> usize {
     let crossings = summary.crossings.iter().filter(|c| c.slip_mm > SLIP_SEEN_MM).count();
     crossings.max(usize::from(summary.slip_mm > SLIP_SEEN_MM))
 }
 
-/// Runs `scenario` once for each of `seeds`, on all processors, and calls `done`
-/// after each run. The lines are in the order of the seeds and do not depend on
-/// the number of processors.
-///
-/// # Errors
-/// [`RunError::Rig`] if the parameters make no controller. A plant that fails, or is
+/// The campaign that runs `scenario` once for each of `seeds`. A plant that fails, or is
 /// refused, is a line with an error.
-pub fn run(
+pub fn campaign(
     scenario: &Scenario,
-    seeds: &[u64],
-    done: &(dyn Fn() + Sync),
-) -> Result<Vec<RunLine>, RunError> {
-    seeds
-        .par_iter()
-        .map(|&seed| {
-            let line = one(scenario, seed);
+    seeds: Vec<u64>,
+) -> Campaign<'_, u64, RunLine, Vec<RunLine>, RunError> {
+    Campaign {
+        steps: ("runs", 1),
+        cases: seeds,
+        run: Box::new(|seed, done| {
+            let line = one(scenario, *seed);
             done();
             line
-        })
-        .collect()
+        }),
+        fold: Box::new(|lines| lines.into_iter().map(|(_, line)| line).collect()),
+    }
 }
 
 fn one(scenario: &Scenario, seed: u64) -> Result<RunLine, RunError> {
@@ -284,7 +278,7 @@ mod tests {
         let scenario = Scenario::default();
         let with = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            pool.install(|| run(&scenario, &[3, 1, 2], &|| {}).unwrap())
+            pool.install(|| campaign(&scenario, vec![3, 1, 2]).complete(&|| {}).unwrap())
         };
         let lines = with(1);
         assert_eq!(lines.iter().map(|line| line.seed).collect::<Vec<_>>(), [3, 1, 2]);

@@ -77,7 +77,6 @@ pub struct Bounds {
 
 impl Bounds {
     /// What this run kept; of a run that did not complete, the reference gap and no slip.
-    #[must_use]
     pub fn of(line: &RunLine, gap_ref_mm: f64) -> Self {
         let kept = line.least_slip_margin.filter(|_| line.completed).zip(Some(line.max_gap_mm));
         let (slip_margin, gap_mm) = kept.unwrap_or((0.0, gap_ref_mm));

@@ -14,8 +14,9 @@ use interstage::params::{CompileError, ParameterSet, SCHEMA, SetError, compile};
 use interstage::rig::Rig;
 
 use crate::files::{FileError, atomic_write};
+use crate::probe::PortError;
 
-pub use line::{Client, Wire};
+pub use line::Client;
 
 /// Why an operation on parameters failed. Displays as one line.
 #[derive(Debug, thiserror::Error)]
@@ -55,6 +56,9 @@ pub enum StoreError {
     #[error("the board answered something else than it was asked")]
     Answer,
     /// The connection to the board failed.
+    #[error(transparent)]
+    Port(#[from] PortError),
+    /// The emulated board cannot be started.
     #[error("{0}")]
     Wire(String),
 }

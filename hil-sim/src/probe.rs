@@ -14,6 +14,8 @@ pub use real::RealPort;
 pub use reconnecting::ReconnectingPort;
 #[cfg(test)]
 pub(crate) use reconnecting::tests as script;
+#[cfg(test)]
+pub(crate) use tests::Mute;
 
 /// Why a port failed. Displays as one line.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -44,7 +46,53 @@ pub trait Port {
     /// Reads memory.
     fn memory(&mut self, address: u32, into: &mut [u8]) -> Result<(), PortError>;
 
-    /// Waits before the next poll of the board; returns how long this and the accesses since the
-    /// last call took.
-    fn pass(&mut self) -> Result<Duration, PortError>;
+    /// Waits before the next poll of the board.
+    fn pass(&mut self) -> Result<(), PortError>;
+
+    /// Time of the board since the port was opened: elapsed or emulated.
+    fn now(&self) -> Duration;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A board that takes nothing and says nothing, behind a slow probe: each transfer takes as
+    /// long as many a pause between two.
+    pub(crate) struct Mute(Duration);
+
+    impl Mute {
+        pub(crate) const fn new() -> Self {
+            Self(Duration::ZERO)
+        }
+    }
+
+    impl Port for Mute {
+        fn up(&mut self, _: u32) -> Result<Vec<u8>, PortError> {
+            self.0 += Duration::from_millis(2);
+            Ok(Vec::new())
+        }
+
+        fn down(&mut self, _: u32, _: &[u8]) -> Result<usize, PortError> {
+            self.0 += Duration::from_millis(2);
+            Ok(0)
+        }
+
+        fn reset(&mut self) -> Result<(), PortError> {
+            Ok(())
+        }
+
+        fn memory(&mut self, _: u32, _: &mut [u8]) -> Result<(), PortError> {
+            Ok(())
+        }
+
+        fn pass(&mut self) -> Result<(), PortError> {
+            self.0 += Duration::from_micros(200);
+            Ok(())
+        }
+
+        fn now(&self) -> Duration {
+            self.0
+        }
+    }
 }

@@ -7,6 +7,7 @@ mod columns;
 mod csv_file;
 mod decoder;
 mod drawn;
+mod joined;
 pub(crate) mod json;
 mod ledger;
 mod mcap_file;
@@ -25,6 +26,7 @@ mod write;
 
 pub use csv_file::{Metadata, write_metadata};
 pub use decoder::{Counts, Decoder, Item, Mark};
+pub use joined::JoinedLog;
 pub use ledger::LedgerLine;
 pub use mcap_file::{FRAMES, Topic, messages, unwrapped, write_mcap};
 pub use probed::Probed;
@@ -33,6 +35,7 @@ pub use recorder::{RunRecorder, text};
 pub use recording::recordings;
 pub use run::{Boot, Cut, Header, Run, Since, Unknown};
 pub use source::{Bytes, Source, SourceError, Virtual, letter, starter};
+pub(crate) use summary::or_nan;
 pub use summary::{CrossingLine, LogLine, Recording, Report, Summary};
 pub use tick::{
     Controller, MODE_NAMES, STAGE_NAMES, Tick, TrueState, mode_number, mode_words, stage_name,

@@ -25,6 +25,7 @@ pub(crate) use page::capital;
 pub use page::{Section, html, log_html, page_of};
 pub use panels::overview_svg;
 pub(crate) use scene::Geometry;
+pub(crate) use tables::table;
 
 #[cfg(test)]
 mod tests;

@@ -125,6 +125,19 @@ impl Scenario {
         toml::to_string(self).expect("numbers, words and lists are always TOML")
     }
 
+    /// The `count` seeds that follow this one.
+    ///
+    /// # Errors
+    /// If a scenario cannot have the last of them.
+    pub fn seeds(&self, count: u64) -> Result<Vec<u64>, ScenarioError> {
+        let seed = self.run.seed;
+        let last = seed.checked_add(count).filter(|last| i64::try_from(*last).is_ok());
+        let most = (i64::MAX as u64).saturating_sub(count);
+        let expected = format!("at most {most}, so that {count} seeds can follow");
+        let last = last.ok_or_else(|| ScenarioError::wrong("seeds", "run.seed", seed, expected))?;
+        Ok((seed + 1..=last).collect())
+    }
+
     /// The plant of the scenario's seed.
     pub fn plant(&self) -> PlantParameters {
         self.plant_with(&self.drawn_mismatch())

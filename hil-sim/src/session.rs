@@ -2,13 +2,12 @@
 //! millisecond per step, as fast as the host allows.
 
 mod closed_loop;
-mod echo;
 mod stream;
 
 use std::time::Instant;
 
 use interstage::model::Strategy;
-use interstage::rig::RigError;
+use interstage::rig::{Rig, RigError};
 use interstage::supervise::{Command, Mode};
 use interstage::tick::Output;
 
@@ -18,13 +17,21 @@ use crate::record::{Recording, starter};
 use crate::scenario::{ControllerKind, Scenario};
 
 pub use closed_loop::{Session, drives, initial_rig, read};
-pub use echo::Echo;
 pub use stream::Stream;
 
 /// Control period, s.
 pub(crate) const TICK_S: f64 = 1e-3;
-/// Longest run, s: three times the travel at the least useful speed.
-pub(crate) const LONGEST_S: f64 = 120.0;
+/// Least useful speed, mm/s.
+const SLOWEST_MM_S: f64 = 2.0;
+/// What every run is given at least, s.
+const LEAST_S: f64 = 120.0;
+
+/// Longest run of a rig in one direction, s: three times the travel at the least useful
+/// speed, or at cruise speed where that is slower.
+pub fn longest_s(rig: &Rig) -> f64 {
+    let slowest = rig.drive.cruise_speed_mm_s.min(SLOWEST_MM_S);
+    LEAST_S.max(3.0 * rig.rig.travel_mm / slowest)
+}
 
 /// Options of a run beside its scenario.
 #[derive(Clone, Copy, Debug, Default)]
@@ -72,16 +79,20 @@ pub fn run(scenario: &Scenario, options: Options) -> Result<Recording, RunError>
 
 /// [`run`] of a session that has been made ready for this scenario.
 pub fn run_session(mut session: Session, scenario: &Scenario) -> Result<Recording, RunError> {
-    let mut start = Some(starter(scenario.run.direction));
+    let (mut start, longest_s) = (Some(starter(scenario.run.direction)), longest_s(&scenario.rig));
     let started = Instant::now();
-    while tick(&mut session, &mut start)?.is_some() {}
+    while tick(&mut session, &mut start, longest_s)?.is_some() {}
     Ok(session.finish(started.elapsed().as_secs_f64()))
 }
 
 /// A tick of a run that gets `start` as soon as the drive is idle; none at its end.
-fn tick(session: &mut Session, start: &mut Option<Command>) -> Result<Option<Output>, RunError> {
+fn tick(
+    session: &mut Session,
+    start: &mut Option<Command>,
+    longest_s: f64,
+) -> Result<Option<Output>, RunError> {
     let over = matches!(session.mode(), Mode::Complete(_) | Mode::FaultHold(_));
-    if over || session.time_s() >= LONGEST_S {
+    if over || session.time_s() >= longest_s {
         return Ok(None);
     }
     let command = if session.mode() == Mode::Idle { start.take() } else { None };

@@ -6,9 +6,11 @@ mod drive;
 mod roll;
 
 use std::collections::BTreeMap;
+use std::convert::Infallible;
 
-use rayon::prelude::*;
 use serde::Serialize;
+
+use crate::campaign::Campaign;
 
 pub use cases::StressCase;
 use cases::{RADIUS_MM, beyond, draw};
@@ -43,6 +45,13 @@ pub enum Figure {
     Unbalanced,
     /// Speed of the tread over that of the unloaded motor.
     Overspeed,
+}
+
+impl Figure {
+    const ALL: [Self; 6] = {
+        use Figure::{Energy, Overspeed, Penetration, RingEnergy, RingPenetration, Unbalanced};
+        [RingPenetration, RingEnergy, Penetration, Energy, Unbalanced, Overspeed]
+    };
 }
 
 /// A figure of a case, in parts of its limit.
@@ -81,31 +90,38 @@ pub struct StressReport {
     pub worst: Vec<Worst>,
 }
 
-type Ran = (StressCase, Result<Vec<(Figure, f64)>, String>);
+/// Value of each figure, or why there is none. What is not finite has none.
+type Ran = Result<Vec<Option<f64>>, String>;
 
-/// Runs `count` cases and calls `done` after each; checks that a twentieth as many impossible
-/// ones are refused.
-pub fn run(count: usize, seed: u64, done: &(dyn Fn() + Sync)) -> StressReport {
-    let run = |case| {
-        let figures = one(&case);
+/// The campaign of `count` cases; checks that a twentieth as many impossible ones are refused.
+pub fn campaign(
+    count: usize,
+    seed: u64,
+) -> Campaign<'static, StressCase, Ran, StressReport, Infallible> {
+    let run = |case: &StressCase, done: &(dyn Fn() + Sync)| {
+        let figures = one(case);
         done();
-        (case, figures)
+        Ok(figures.map(|all| all.map(|value| Some(value).filter(|v| v.is_finite())).to_vec()))
     };
-    let mut report = gather(draw(count, seed).into_par_iter().map(run).collect());
-    for (case, name) in beyond(count.div_ceil(PER_REFUSED), seed) {
-        match refused(&case, name) {
-            Ok(text) => {
-                let refused: &mut Refused = report.refused.entry(name).or_default();
-                refused.count += 1;
-                refused.example = text;
-            }
-            Err(why) => {
-                report.cases += 1;
-                report.failed.push(StressFailure { why, case });
+    let fold = move |lines| {
+        let mut report = gather(lines);
+        for (case, name) in beyond(count.div_ceil(PER_REFUSED), seed) {
+            match refused(&case, name) {
+                Ok(text) => {
+                    let refused: &mut Refused = report.refused.entry(name).or_default();
+                    refused.count += 1;
+                    refused.example = text;
+                }
+                Err(why) => {
+                    report.cases += 1;
+                    report.failed.push(StressFailure { why, case });
+                }
             }
         }
-    }
-    report
+        report
+    };
+    let steps = ("cases of the plant", 1);
+    Campaign { steps, cases: draw(count, seed), run: Box::new(run), fold: Box::new(fold) }
 }
 
 /// Largest force on the wheel without the load: preload, and the spring on top of the step, N.
@@ -122,30 +138,32 @@ fn refused(case: &StressCase, name: &str) -> Result<String, String> {
     }
 }
 
-fn one(case: &StressCase) -> Result<Vec<(Figure, f64)>, String> {
+/// The figures of [`Figure::ALL`] in their order.
+fn one(case: &StressCase) -> Result<[f64; 6], String> {
     let plant = drive::plant(case);
     plant.check(pressed_n(case)).map_err(|refusal| format!("refused: {refusal}"))?;
     let rolled = roll::run(case).map_err(|error| format!("ring: {error}"))?;
     let drove = drive::run(case, &plant).map_err(|error| error.to_string())?;
     let deepest = DEEPEST * RADIUS_MM;
-    Ok(vec![
-        (Figure::RingPenetration, rolled.depth_mm / deepest),
-        (Figure::RingEnergy, rolled.created_mj / rolled.resolved_mj),
-        (Figure::Penetration, drove.depth_mm / deepest),
-        (Figure::Energy, drove.created_mj / drove.allowed_mj),
-        (Figure::Unbalanced, drove.unbalanced / UNBALANCED),
-        (Figure::Overspeed, drove.overspeed / OVERSPEED),
+    Ok([
+        rolled.depth_mm / deepest,
+        rolled.created_mj / rolled.resolved_mj,
+        drove.depth_mm / deepest,
+        drove.created_mj / drove.allowed_mj,
+        drove.unbalanced / UNBALANCED,
+        drove.overspeed / OVERSPEED,
     ])
 }
 
-fn gather(ran: Vec<Ran>) -> StressReport {
+fn gather(ran: Vec<(StressCase, Ran)>) -> StressReport {
     let mut report = StressReport { cases: ran.len(), ..StressReport::default() };
     let mut figures: BTreeMap<Figure, Vec<(f64, StressCase)>> = BTreeMap::new();
     for (case, ran) in ran {
         match ran {
             Err(why) => report.failed.push(StressFailure { why, case }),
             Ok(found) => {
-                for (figure, value) in found {
+                for (figure, value) in Figure::ALL.into_iter().zip(found) {
+                    let value = value.unwrap_or(f64::NAN);
                     if value > 1.0 || value.is_nan() {
                         let why = format!("{figure:?} at {value:.3} of its limit");
                         report.failed.push(StressFailure { why, case });
@@ -182,7 +200,7 @@ mod tests {
         for index in ONCE_GAINED {
             let case = &cases[index];
             let found = one(case).unwrap_or_else(|why| panic!("{why}: {case:?}"));
-            assert!(found.iter().all(|(_, value)| *value <= 1.0), "{found:?}: {case:?}");
+            assert!(found.iter().all(|value| *value <= 1.0), "{found:?}: {case:?}");
         }
     }
 
@@ -199,8 +217,8 @@ mod tests {
     #[test]
     fn a_figure_beyond_its_limit_is_a_failure() {
         let case = draw(1, 1)[0];
-        let ran = |value| (case, Ok(vec![(Figure::Energy, value)]));
-        let report = gather(vec![ran(0.9), ran(1.1), ran(f64::NAN)]);
+        let ran = |value| (case, Ok(vec![Some(0.1), value]));
+        let report = gather(vec![ran(Some(0.9)), ran(Some(1.1)), ran(None)]);
         assert_eq!((report.cases, report.failed.len()), (3, 2));
     }
 }

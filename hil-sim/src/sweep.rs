@@ -99,21 +99,6 @@ pub fn row(axes: &[Axis], place: &[&str], found: Map<String, Value>) -> Map<Stri
     keys.chain(found).collect()
 }
 
-/// The rows as a table of comma-separated values with these columns.
-pub fn csv(columns: &[String], rows: &[Map<String, Value>]) -> csv::Result<String> {
-    let mut table = csv::Writer::from_writer(Vec::new());
-    table.write_record(columns)?;
-    for row in rows {
-        let cell = |name: &String| match row.get(name) {
-            None | Some(Value::Null) => String::new(),
-            Some(value) => crate::scenario::brief(value),
-        };
-        table.write_record(columns.iter().map(cell))?;
-    }
-    let bytes = table.into_inner().map_err(|error| error.into_error())?;
-    Ok(String::from_utf8_lossy(&bytes).into_owned())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -150,7 +135,5 @@ mod tests {
         assert_eq!((&all[0][..], &all[4][..]), (&["1", "x"][..], &["2", "y"][..]));
         let rows: Vec<_> = all.iter().map(|place| row(&axes, place, Map::new())).collect();
         assert_eq!((&rows[4]["a"], &rows[4]["b"]), (&2.0.into(), &"y".into()));
-        let columns = ["a", "b", "gap"].map(str::to_owned);
-        assert_eq!(csv(&columns, &rows[4..5]).unwrap(), "a,b,gap\n2,y,\n");
     }
 }

@@ -80,9 +80,9 @@ impl<'a> Bench<'a> {
         scenario: &Scenario,
         mistakes: &[Mistake],
     ) -> Result<Self, ImageError> {
-        let wiring = Wiring::with(mistakes);
+        let mut wiring = Wiring::with(mistakes);
         let mut parameters = scenario.plant();
-        wiring.build(&mut parameters);
+        wiring.build(&scenario.rig, &mut parameters);
         let (position, preload) = match scenario.run.direction {
             Direction::Deploy => (0.0, 0.0),
             Direction::Retract => (scenario.rig.rig.travel_mm, scenario.rig.preload.cruise_n),

@@ -8,15 +8,12 @@ use hil_sim::bringup::{Action, BringupError, Operator, Question, Seen};
 use hil_sim::probe::{Port, PortError};
 
 use super::bench::Bench;
-use super::core::{Access, Bus};
-use super::port::Usb;
+use super::port::{Usb, gone};
 
 /// Travel of the tread that an eye sees, mm.
 const SEEN_MM: f64 = 0.5;
 /// Time for which a hand holds the reset button, ms.
 const RESET_MS: u32 = 300;
-/// First address of the peripherals.
-const PERIPHERALS: u32 = 0x4000_0000;
 
 /// A bench with a probe at its board and a person beside it.
 pub struct Attended<'a> {
@@ -25,15 +22,13 @@ pub struct Attended<'a> {
     usb: Option<Usb>,
     /// Time that they took and that has not passed at the bench, us.
     owed: u64,
-    /// Milliseconds since the last pause.
-    spent: u64,
 }
 
 impl<'a> Attended<'a> {
     /// This bench, its motor supply switched off.
     pub fn new(mut bench: Bench<'a>) -> Self {
         bench.wiring_mut().switched_off = true;
-        Self { bench: Rc::new(RefCell::new(bench)), usb: None, owed: 0, spent: 0 }
+        Self { bench: Rc::new(RefCell::new(bench)), usb: None, owed: 0 }
     }
 
     /// The same with a probe on USB; otherwise an access takes no time.
@@ -47,14 +42,9 @@ impl<'a> Attended<'a> {
         self.owed += (0..accesses).map(|_| usb.access_us()).sum::<u64>();
         while self.owed >= 1000 {
             self.owed -= 1000;
-            self.step()?;
+            self.bench.borrow_mut().pass()?;
         }
         Ok(())
-    }
-
-    fn step(&mut self) -> Result<(), PortError> {
-        self.spent += 1;
-        self.bench.borrow_mut().step().map(|_| ()).map_err(gone)
     }
 
     /// The person, whose motions `asked` allows.
@@ -69,51 +59,32 @@ fn tread_mm(bench: &Bench<'_>) -> f64 {
     plant.truth().rotation_rad * plant.parameters().ring.radius_mm
 }
 
-fn gone(error: impl std::fmt::Display) -> PortError {
-    PortError::Gone(error.to_string())
-}
-
 impl Port for Attended<'_> {
     fn up(&mut self, channel: u32) -> Result<Vec<u8>, PortError> {
         self.access(3)?;
-        let mut bench = self.bench.borrow_mut();
-        match channel {
-            1 => Ok(bench.take_frames()),
-            2 => bench.line_take().map_err(gone),
-            _ => Ok(Vec::new()),
-        }
+        self.bench.borrow_mut().up(channel)
     }
 
     fn down(&mut self, channel: u32, bytes: &[u8]) -> Result<usize, PortError> {
         self.access(4)?;
-        let mut bench = self.bench.borrow_mut();
-        match channel {
-            1 => bench.line_send(bytes).map_err(gone),
-            _ => Err(PortError::Board(format!("nothing sends down channel {channel}"))),
-        }
+        self.bench.borrow_mut().down(channel, bytes)
     }
 
     fn reset(&mut self) -> Result<(), PortError> {
-        self.bench.borrow_mut().hold_reset(1).map_err(gone)
+        self.bench.borrow_mut().reset()
     }
 
     fn memory(&mut self, address: u32, into: &mut [u8]) -> Result<(), PortError> {
         self.access(1)?;
-        let mut bench = self.bench.borrow_mut();
-        let machine = bench.machine_mut();
-        if address < PERIPHERALS {
-            return machine.peek(address, into).map_err(gone);
-        }
-        let now = machine.now();
-        let access = Access { address, size: 4, pc: 0, now };
-        let word = machine.chip_mut().read(access).to_le_bytes();
-        into.iter_mut().zip(word).for_each(|(byte, read)| *byte = read);
-        Ok(())
+        self.bench.borrow_mut().memory(address, into)
     }
 
-    fn pass(&mut self) -> Result<Duration, PortError> {
-        self.step()?;
-        Ok(Duration::from_millis(std::mem::take(&mut self.spent)))
+    fn pass(&mut self) -> Result<(), PortError> {
+        self.bench.borrow_mut().pass()
+    }
+
+    fn now(&self) -> Duration {
+        self.bench.borrow().now()
     }
 }
 

@@ -24,7 +24,9 @@ use crate::peripherals::rcc::Cause;
 use crate::run::store;
 use hil_sim::faults::campaign::operator::Operator;
 use hil_sim::faults::campaign::twin::Twin;
-use hil_sim::faults::campaign::{AFTER_S, Campaign, Instant, LONGEST_S, Outcome, crossed, doing};
+use hil_sim::faults::campaign::{
+    AFTER_S, FaultCampaign, Instant, Outcome, crossed, doing, longest_s,
+};
 use hil_sim::faults::judge::{Finding, Judge};
 use hil_sim::faults::sets;
 use hil_sim::params::set_of;
@@ -55,15 +57,16 @@ pub struct Firmware<'a> {
     pub strings: &'a Strings,
 }
 
-/// Runs a campaign on the emulated board, as [`Campaign::run`] does in software.
+/// Runs a campaign on the emulated board, as [`FaultCampaign::run`] does in software.
 pub fn run(
-    campaign: &Campaign,
+    campaign: &FaultCampaign,
     firmware: Firmware<'_>,
     done: &(dyn Fn() + Sync),
 ) -> Result<Outcome, BoardError> {
     let twin = |scenario: &Scenario| twin(firmware, scenario);
     let watched = |scenario: &Scenario, twin: &Twin| watched(firmware, scenario, twin);
-    campaign.run_on("board", twin, watched, done)
+    let rigs = campaign.rigs(twin, done)?;
+    campaign.on("board", &rigs, watched).complete(done)
 }
 
 /// A running board.
@@ -203,12 +206,13 @@ impl<'a> Board<'a> {
 }
 
 /// The run without the fault.
-fn twin(firmware: Firmware<'_>, scenario: &Scenario) -> Result<Twin, BoardError> {
+pub fn twin(firmware: Firmware<'_>, scenario: &Scenario) -> Result<Twin, BoardError> {
     let mut board = Board::new(firmware, scenario)?;
     let mut operator = Operator::default();
     let mut twin = Twin::new(scenario).map_err(|error| BoardError::Scenario(error.to_string()))?;
     let mut over_s = 0.0;
-    while board.bench.time_s() < LONGEST_S && over_s < AFTER_S {
+    let longest_s = longest_s(&scenario.rig);
+    while board.bench.time_s() < longest_s && over_s < AFTER_S {
         let t_s = board.bench.time_s();
         let command = operator.command(board.mode);
         if !operator.started() {
@@ -223,7 +227,7 @@ fn twin(firmware: Firmware<'_>, scenario: &Scenario) -> Result<Twin, BoardError>
 }
 
 /// A run with its fault, compared with its twin.
-fn watched(
+pub fn watched(
     firmware: Firmware<'_>,
     scenario: &Scenario,
     twin: &Twin,
@@ -239,7 +243,8 @@ fn watched(
     let of_image = scenario.run.faults.iter().any(damages);
     let (mut during, mut after_s) = (None, 0.0);
     let (mut worst_mm, mut back_s) = (0.0f64, None);
-    while board.bench.time_s() < LONGEST_S && after_s < AFTER_S {
+    let longest_s = longest_s(&scenario.rig);
+    while board.bench.time_s() < longest_s && after_s < AFTER_S {
         let t_s = board.bench.time_s();
         let before = board.mode;
         // During a save of parameters the operator gives no command.
@@ -300,22 +305,16 @@ fn watched(
     };
     let finding = if unrecorded.is_some() { Finding::Undetected } else { finding };
     let harms = judge.harms().into_iter().chain(around).chain(unrecorded).collect();
-    let injection = scenario.run.faults.first();
+    let judged = Instant::judged(scenario, &judge, twin, gap_part);
     Ok(Instant {
-        seed: scenario.run.seed,
         at_s: times.struck_s,
-        magnitude: injection.map(Injection::magnitude),
-        during: during.unwrap_or("at rest"),
+        during: during.unwrap_or("at rest").into(),
         finding,
-        code: report.map(|(_, code)| code),
-        restart,
+        restart: restart.map(Into::into),
         latency_ms: since(times.visible_s).or(since(times.acts_s).map(|_| 0.0)),
-        rest_ms: judge.fault.and_then(|(at_s, _)| Some(1e3 * (judge.rest_s? - at_s).max(0.0))),
-        end: if board.image_s.is_some() { "hold" } else { judge.end() },
-        peak_preload_n: judge.peak_preload_n,
-        motion_mm: judge.motion_mm,
-        gap_part,
+        end: if board.image_s.is_some() { "hold".into() } else { judged.end },
         harms,
+        ..judged
     })
 }
 

@@ -4,13 +4,12 @@ use crate::bench::Bench;
 use crate::log::Strings;
 use hil_sim::record::{Source, SourceError};
 use hil_sim::scenario::Scenario;
+use hil_sim::session::longest_s;
 
 /// Milliseconds that the board runs at each reading.
 const STEPS: u32 = 20;
 /// Milliseconds that the board runs on after the drive has arrived.
 const AFTER: u32 = 100;
-/// Longest run without an operator, s.
-const LONGEST_S: f64 = 120.0;
 /// Modes in which a run without an operator is over.
 const OVER: [&str; 3] = ["mode: deployed", "mode: retracted", "mode: fault hold"];
 
@@ -22,6 +21,8 @@ fn broken(error: impl std::error::Error + Send + Sync + 'static) -> SourceError 
 pub struct Emulated<'a> {
     bench: Bench<'a>,
     attended: bool,
+    /// Longest run without an operator, s.
+    longest_s: f64,
     /// Milliseconds until the run ends, once that is known.
     left: Option<u32>,
 }
@@ -40,7 +41,7 @@ impl<'a> Emulated<'a> {
         if !attended {
             bench.start_when_idle();
         }
-        Ok(Self { bench, attended, left: None })
+        Ok(Self { bench, attended, longest_s: longest_s(&scenario.rig), left: None })
     }
 
     /// Runs the board for a millisecond; false if the run is over.
@@ -55,7 +56,7 @@ impl<'a> Emulated<'a> {
                 self.left.get_or_insert(AFTER);
             }
         }
-        if !self.attended && self.bench.time_s() >= LONGEST_S {
+        if !self.attended && self.bench.time_s() >= self.longest_s {
             self.left.get_or_insert(1);
         }
         Ok(true)

@@ -9,6 +9,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 use hil_sim::cli::failure::{Failure, Outcome};
 use hil_sim::cli::{bringup, capture, faults, live, output, params};
+use hil_sim::faults::campaign::twin::Twin;
 use hil_sim::firmware::{self, Profile, build_binary};
 use hil_sim::params::Client;
 use hil_sim::progress;
@@ -23,7 +24,6 @@ use crate::cycles::{self, Step, TickCycles};
 use crate::image::Image;
 use crate::load;
 use crate::log::Strings;
-use crate::params::EmulatedBoard;
 use crate::run::{self, RunOptions};
 use crate::wiring::Mistake;
 
@@ -128,11 +128,11 @@ fn faults(args: &faults::Args) -> Result<Outcome, Failure> {
     let campaign = args.campaign()?;
     let (elf, strings) = image(&campaign.scenario)?;
     let firmware = Firmware { elf: &elf, strings: &strings };
-    let outcome = {
-        let bar = progress::bar("runs", campaign.runs());
-        campaign::run(&campaign, firmware, &|| bar.advance(1)).map_err(Failure::run)?
+    let twin = |scenario: &Scenario| campaign::twin(firmware, scenario).map_err(Failure::run);
+    let watched = |scenario: &Scenario, twin: &Twin| {
+        campaign::watched(firmware, scenario, twin).map_err(Failure::run)
     };
-    faults::ended(args, &outcome)
+    faults::carry_out(args, &campaign, twin, watched)
 }
 
 /// Starts the board with the flash that the file holds, does what was asked with its
@@ -145,10 +145,10 @@ fn params(args: &params::Args) -> Result<Outcome, Failure> {
     }
     let mut client = {
         let _progress = progress::spinner("starting the board");
-        Client::new(EmulatedBoard::start(&elf, &args.flash)?)
+        Client::new(crate::params::start(&elf, &args.flash)?)
     };
     let outcome = params::act(args, &mut client);
-    client.into_wire().keep()?;
+    crate::params::keep(&client.into_port(), &args.flash)?;
     outcome
 }
 

@@ -4,12 +4,16 @@ use std::time::Duration;
 
 use hil_sim::probe::{Port, PortError};
 
+use crate::bench::Bench;
+use crate::core::{Access, Bus};
 use crate::error::ImageError;
 use crate::machine::Machine;
 use crate::peripherals::HZ;
 use crate::peripherals::rcc::Cause;
 use crate::rtt::Probe;
 
+/// First address of the peripherals.
+const PERIPHERALS: u32 = 0x4000_0000;
 /// Cycles of a pause between two polls.
 const LOOK: u64 = 4000;
 
@@ -33,15 +37,13 @@ pub struct EmulatedPort {
     probe: Probe,
     /// Its accesses take time.
     usb: Option<Usb>,
-    /// Cycles that they took since the last pause.
-    spent: u64,
 }
 
 impl EmulatedPort {
     /// A board with this image, before its first instruction.
     pub fn new(elf: &[u8]) -> Result<Self, ImageError> {
         let machine = Machine::new(elf)?;
-        Ok(Self { probe: Probe::of(&machine)?, machine, usb: None, spent: 0 })
+        Ok(Self { probe: Probe::of(&machine)?, machine, usb: None })
     }
 
     /// The same at a probe on USB; otherwise an access takes no time.
@@ -57,10 +59,7 @@ impl EmulatedPort {
     }
 
     fn run(&mut self, cycles: u64) -> Result<(), PortError> {
-        let before = self.machine.now();
-        self.machine.run_on(before + cycles).map_err(gone)?;
-        self.spent += self.machine.now() - before;
-        Ok(())
+        self.machine.run_on(self.machine.now() + cycles).map_err(gone)
     }
 
     /// The board.
@@ -75,7 +74,7 @@ impl EmulatedPort {
 }
 
 /// A failure of the engine as one of the probe.
-fn gone(error: impl std::fmt::Display) -> PortError {
+pub(crate) fn gone(error: impl std::fmt::Display) -> PortError {
     PortError::Gone(error.to_string())
 }
 
@@ -104,8 +103,53 @@ impl Port for EmulatedPort {
         self.machine.peek(address, into).map_err(gone)
     }
 
-    fn pass(&mut self) -> Result<Duration, PortError> {
-        self.run(LOOK)?;
-        Ok(Duration::from_nanos(std::mem::take(&mut self.spent) * 1_000_000_000 / HZ))
+    fn pass(&mut self) -> Result<(), PortError> {
+        self.run(LOOK)
+    }
+
+    fn now(&self) -> Duration {
+        Duration::from_secs_f64(self.machine.now() as f64 / HZ as f64)
+    }
+}
+
+/// The bench by its console: log and line, a millisecond between two polls.
+impl Port for Bench<'_> {
+    fn up(&mut self, channel: u32) -> Result<Vec<u8>, PortError> {
+        match channel {
+            1 => Ok(self.take_frames()),
+            2 => self.line_take().map_err(gone),
+            _ => Ok(Vec::new()),
+        }
+    }
+
+    fn down(&mut self, channel: u32, bytes: &[u8]) -> Result<usize, PortError> {
+        match channel {
+            1 => self.line_send(bytes).map_err(gone),
+            _ => Err(PortError::Board(format!("nothing sends down channel {channel}"))),
+        }
+    }
+
+    fn reset(&mut self) -> Result<(), PortError> {
+        self.hold_reset(1).map_err(gone)
+    }
+
+    fn memory(&mut self, address: u32, into: &mut [u8]) -> Result<(), PortError> {
+        let machine = self.machine_mut();
+        if address < PERIPHERALS {
+            return machine.peek(address, into).map_err(gone);
+        }
+        let now = machine.now();
+        let access = Access { address, size: 4, pc: 0, now };
+        let word = machine.chip_mut().read(access).to_le_bytes();
+        into.iter_mut().zip(word).for_each(|(byte, read)| *byte = read);
+        Ok(())
+    }
+
+    fn pass(&mut self) -> Result<(), PortError> {
+        self.step().map(drop).map_err(gone)
+    }
+
+    fn now(&self) -> Duration {
+        Duration::from_secs_f64(self.time_s())
     }
 }

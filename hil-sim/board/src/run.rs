@@ -1,13 +1,10 @@
 //! A run on the emulated board: power-up, one command, arrival.
 
-mod trace;
-
 use std::time::Instant;
 
 use super::bench::Bench;
 use super::elf::RAM;
 use super::error::BoardError;
-use super::faults::Timed;
 use super::load::{Gathered, Load};
 use super::log::{Line, Strings};
 use super::machine::Machine;
@@ -18,14 +15,14 @@ use crate::chip::map::PARAMETER_SETS;
 use hil_sim::faults::sets;
 use hil_sim::firmware::Footprint;
 use hil_sim::params::set_of;
-use hil_sim::record::Recording;
+use hil_sim::record::{JoinedLog, LogLine, Recording};
 use hil_sim::scenario::injection::{Injection, Target};
 use hil_sim::scenario::{ControllerKind, Scenario};
+use hil_sim::session::longest_s;
 
-use trace::Trace;
-
-/// Longest run, s: as in software.
-const LONGEST_S: f64 = 120.0;
+/// Numbers of the modes in which a run is over.
+const COMPLETE: u8 = 10;
+const FAULT_HOLD: u8 = 11;
 /// Time for which the board runs on after arrival, ms.
 const AFTER: u32 = 100;
 /// The same after a restart under way, s: it reports the cause and is idle again.
@@ -73,8 +70,6 @@ pub(crate) fn store(machine: &mut Machine, scenario: &Scenario) -> Result<(), Bo
 pub struct RunOptions {
     /// Keep one row a millisecond.
     pub rows: bool,
-    /// Faults of the hardware during the run.
-    pub faults: Vec<Timed>,
     /// Count the flash's wait states; takes three times as long.
     pub wait_states: bool,
 }
@@ -105,24 +100,24 @@ pub fn run_with(
     if options.wait_states {
         bench.machine_mut().count_waits()?;
     }
-    let mut trace = Trace::new(bench.plant());
+    let (mut log, mut lines_of_log) = (JoinedLog::new(0), Vec::new());
     bench.start_when_idle();
     let started = Instant::now();
     let mut after = AFTER;
     let mut gathered = Gathered::default();
     let mut stream = Vec::new();
-    let mut faults = options.faults.clone();
-    let mut ends_at = LONGEST_S;
+    let mut ends_at = longest_s(&scenario.rig);
     while bench.time_s() < ends_at && after > 0 {
-        let now = bench.time_s();
-        for due in faults.extract_if(.., |due| due.at_s <= now) {
-            due.fault.strike(bench.machine_mut())?;
-        }
         let waited = bench.waits_to_start();
         let restarts = bench.machine().restarts().len();
+        log.add(bench.plant().truth());
+        let t_s = bench.time_s();
         let (_, lines) = bench.step()?;
         for line in &lines {
             watch(bench.time_s(), line);
+            let level = if line.level.is_empty() { "" } else { " " };
+            let text = format!("{}{level}{}", line.level, line.text);
+            lines_of_log.push(LogLine { t_s, text });
         }
         if waited && !bench.waits_to_start() {
             gathered.begin(bench.machine_mut());
@@ -130,22 +125,24 @@ pub fn run_with(
             gathered.gather(bench.machine_mut());
         }
         let frames = bench.take_frames();
-        let restarted = bench.machine().restarts().len() > restarts;
-        if restarted && !waited {
-            // It starts with the drive at rest and waits for a command.
-            ends_at = ends_at.min(bench.time_s() + AFTER_RESTART_S);
+        if bench.machine().restarts().len() > restarts {
+            log.restarted();
+            if !waited {
+                // It starts with the drive at rest and waits for a command.
+                ends_at = ends_at.min(bench.time_s() + AFTER_RESTART_S);
+            }
         }
-        trace.add(&frames, &lines, bench.plant().truth(), restarted);
+        log.read(&frames);
         stream.extend(frames);
-        if trace.is_over() {
+        if matches!(log.mode(), Some(COMPLETE | FAULT_HOLD)) {
             after -= 1;
         }
     }
     let wall_s = started.elapsed().as_secs_f64();
-    let mut recording = trace.finish(scenario, bench.plant(), options.rows, wall_s);
-    recording.stream = stream;
-    let injected = options.faults.iter().map(|due| format!("{} at {} s", due.fault, due.at_s));
-    recording.summary.injected.extend(injected);
+    let arrived = (log.mode() == Some(COMPLETE)).then_some(scenario.run.direction.into());
+    let of = (scenario, bench.plant());
+    let recording = log.finish("board", of, arrived, options.rows, wall_s);
+    let recording = Recording { log: lines_of_log, stream, ..recording };
     let machine = bench.into_machine();
     let stack = stack_used(&machine)?;
     let load = gathered.close(&machine, &footprint, stack);

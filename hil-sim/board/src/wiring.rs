@@ -1,10 +1,11 @@
 //! Mistakes in the wiring of a rig, between the chip's pins and the plant: what a first power-up
 //! has to find.
 
-use hil_sim::bringup::Sensor;
+use hil_sim::bringup::{Sensor, stowed};
 use hil_sim::plant::draw::PlantParameters;
 use hil_sim::plant::rig::Drives;
 use hil_sim::plant::sensors::Codes;
+use interstage::rig::Rig;
 use interstage::sense::raw::{AdcCode, AngleFrame, BridgeCode, BridgeCodes};
 
 use super::chip::{Chip, Pin};
@@ -116,6 +117,8 @@ impl std::str::FromStr for Mistake {
 #[derive(Clone, Debug, Default)]
 pub struct Wiring {
     mistakes: Vec<Mistake>,
+    /// The angle's code at the stow end.
+    stowed: i32,
     /// The emergency stop is pressed.
     pub stop_pressed: bool,
     /// The motor supply is switched off.
@@ -134,8 +137,9 @@ impl Wiring {
         self.mistakes.contains(&mistake)
     }
 
-    /// The plant as built.
-    pub fn build(&self, plant: &mut PlantParameters) {
+    /// The plant of this rig as built.
+    pub fn build(&mut self, rig: &Rig, plant: &mut PlantParameters) {
+        self.stowed = stowed(rig).round() as i32;
         if self.has(Mistake::PreloadNoise) {
             plant.sensors.noise.preload_sensor_n *= 10.0;
         }
@@ -247,16 +251,29 @@ impl Wiring {
 
     /// The angle's frame with the magnet turned over at the stow end, or the zero elsewhere.
     fn arm(&self, frame: AngleFrame) -> AngleFrame {
-        /// Code at the stow end of the prototype.
-        const STOWED: i32 = 4112;
         let mut code = i32::from(frame.get() & 0x3FFF);
         if self.has(Mistake::ArmInwards) {
-            code = 2 * STOWED - code;
+            code = 2 * self.stowed - code;
         }
         if self.has(Mistake::AngleZero) {
             code += ANGLE_OFF;
         }
         let bits = (code & 0x3FFF) as u16;
         AngleFrame::new(bits | ((bits.count_ones() & 1) as u16) << 15)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_magnet_that_is_turned_over_reads_right_at_the_stow_end_of_any_rig() {
+        let mut rig = Rig::prototype();
+        rig.sense.angle_zero_code += 1000.0;
+        let mut wiring = Wiring::with(&[Mistake::ArmInwards]);
+        wiring.build(&rig, &mut hil_sim::scenario::Scenario::default().plant());
+        let code = stowed(&rig).round() as u16;
+        assert_eq!(wiring.arm(AngleFrame::new(code)).get() & 0x3FFF, code);
     }
 }

@@ -1,7 +1,7 @@
 //! The campaign of faults on the emulated board, a few of them at one instant each, and a
 //! scenario's faults in a run on the board. `cargo rig faults --target board` runs all.
 
-use hil_sim::faults::campaign::{Campaign, Case, Outcome};
+use hil_sim::faults::campaign::{Case, FaultCampaign, Outcome};
 use hil_sim::faults::sets;
 use hil_sim::scenario::Scenario;
 use hil_sim::scenario::injection::{Entry, HARDWARE, Injection, Kind, Target};
@@ -20,7 +20,7 @@ fn matrix(wanted: &[&str]) -> Outcome {
 }
 
 fn tried(cases: Vec<Case>) -> Outcome {
-    let campaign = Campaign { scenario: Scenario::default(), instants: 1, cases };
+    let campaign = FaultCampaign { scenario: Scenario::default(), instants: 1, cases };
     let firmware = Firmware { elf: elf(), strings: strings() };
     campaign::run(&campaign, firmware, &|| {}).expect("a campaign")
 }

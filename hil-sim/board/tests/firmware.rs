@@ -3,6 +3,7 @@
 use hil_sim::plant::rig::Drives;
 use hil_sim::record::{Controller, CrossingLine, Recording, Run, starter};
 use hil_sim::scenario::Scenario;
+use hil_sim::scenario::injection::{Injection, Kind, Target};
 use hil_sim::session::{Options, Session};
 use interstage::model::LimitedBy::{Preload, Slew};
 use interstage::restart::{Reset, Restart};
@@ -11,7 +12,7 @@ use rig_board::chip::Pin;
 use rig_board::core::{Access, Bus};
 use rig_board::faults::Fault;
 use rig_board::peripherals::rcc::Cause;
-use rig_board::run::{self, Ran, RunOptions};
+use rig_board::run::{self, Ran};
 
 use crate::common::{Board, elf, scenario};
 
@@ -172,14 +173,14 @@ fn other_rigs_run_on_the_board_as_in_software() {
 /// second start at its own time.
 #[test]
 fn a_restart_under_way_ends_the_run_with_its_cause() {
-    let faults = vec!["supply-dip@2".parse().expect("a fault")];
-    let options = RunOptions { rows: true, faults, ..RunOptions::default() };
-    let ran = run::run_with(elf(), &scenario(&[]), &options, |_, _| {}).expect("a run");
+    let mut scenario = scenario(&[]);
+    scenario.run.faults = vec![Injection::at(Target::Supply, Kind::Weak, 2.0, 0.0)];
+    let ran = run::run(elf(), &scenario, true, |_, _| {}).expect("a run");
     let (summary, rows) = (&ran.recording.summary, &ran.recording.rows);
     assert!(!summary.completed && summary.total_s < 4.0, "{}", summary.total_s);
     let cause = summary.restart.as_deref().expect("it is reported");
     assert!(cause.contains("supply") && cause.contains("before: "), "{cause}");
-    assert_eq!(summary.injected, ["supply-dip at 2 s"]);
+    assert_eq!(summary.injected, ["supply weak from 2 s"]);
     let known: Vec<f64> = rows.iter().map(|row| row.controller.t_s).collect();
     let falls = known.windows(2).filter(|pair| pair[1] < pair[0]).count();
     assert_eq!(falls, 0, "the time of a row never goes back");
@@ -322,9 +323,9 @@ fn a_broken_sensor_under_way_stops_the_drive_with_a_fault() {
         Fault::DmaStalled,
     ] {
         let (mut board, lines) = struck("deploying: approach", fault, 1500);
-        assert!(lines.iter().any(|line| line.contains("] fault ")), "{fault}: {lines:#?}");
-        assert!(!drives(&mut board, 300), "{fault}");
-        assert!(board.bench.machine().restarts().is_empty(), "{fault}: the tasks live on");
+        assert!(lines.iter().any(|line| line.contains("] fault ")), "{fault:?}: {lines:#?}");
+        assert!(!drives(&mut board, 300), "{fault:?}");
+        assert!(board.bench.machine().restarts().is_empty(), "{fault:?}: the tasks live on");
     }
 }
 

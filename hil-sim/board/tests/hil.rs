@@ -99,8 +99,12 @@ impl Port for InPieces {
         self.0.memory(address, into)
     }
 
-    fn pass(&mut self) -> Result<Duration, PortError> {
+    fn pass(&mut self) -> Result<(), PortError> {
         self.0.pass()
+    }
+
+    fn now(&self) -> Duration {
+        self.0.now()
     }
 }
 

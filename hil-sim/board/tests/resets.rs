@@ -1,7 +1,7 @@
 //! Every end of the firmware, on the emulated board: the bridges go off, and the next start
 //! reports the cause.
 
-use hil_sim::faults::campaign::{Campaign, Case};
+use hil_sim::faults::campaign::{Case, FaultCampaign};
 use hil_sim::scenario::Scenario;
 use interstage::restart::{MissedCheckIns, Reset, Restart, Stopped};
 use interstage::supervise::Mode;
@@ -189,7 +189,7 @@ fn after_resets_at_random_instants_the_drive_holds_and_the_next_run_arrives() {
     }
     let all = Case::all_on_board().into_iter();
     let cases = all.filter(|case| case.is_one_of(&["reset".to_owned()])).collect();
-    let campaign = Campaign { scenario: Scenario::default(), instants: 4, cases };
+    let campaign = FaultCampaign { scenario: Scenario::default(), instants: 4, cases };
     let firmware = Firmware { elf: elf(), strings: strings() };
     let outcome = campaign::run(&campaign, firmware, &|| {}).expect("a campaign");
     let failures: Vec<_> = outcome.matrix.iter().flat_map(|line| &line.failures).collect();

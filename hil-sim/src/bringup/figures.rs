@@ -63,7 +63,7 @@ pub(super) fn angle(row: &Record) -> f64 {
 }
 
 /// Code of the arm with the wheel, uncompressed, on the outermost wall.
-pub(super) fn stowed(rig: &Rig) -> f64 {
+pub fn stowed(rig: &Rig) -> f64 {
     let sine = (rig.centre_radius_mm(0) - rig.rig.arm_pivot_radius_mm) / rig.rig.arm_length_mm;
     rig.sense.angle_zero_code + sine.asin() / std::f64::consts::TAU * TURN
 }

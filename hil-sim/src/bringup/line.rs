@@ -8,14 +8,12 @@ use interstage::supervise::{Mode, ServiceDuties};
 use interstage::units::Duty;
 
 use super::BringupError;
-use crate::params::{Client, Held, Store, StoreError, Wire};
-use crate::probe::Port;
+use crate::params::{Client, Held, Store, StoreError};
+use crate::probe::{Port, PortError};
 use crate::record::{Decoder, Item};
 
-/// RTT channels: binary log, line down and up.
+/// RTT channel of the binary log.
 const LOG: u32 = 1;
-const DOWN: u32 = 1;
-const UP: u32 = 2;
 /// Time after which a request is repeated, ms of the board: a quarter of the firmware's dead
 /// man.
 const REPEAT_MS: u32 = 50;
@@ -31,10 +29,26 @@ struct Listener<'p> {
     rows: Vec<Record>,
 }
 
-impl Listener<'_> {
-    /// Lets the board run on and reads its log; returns how long.
-    fn pass(&mut self) -> Result<Duration, BringupError> {
-        let passed = self.port.pass()?;
+/// Reads the log whenever the board runs on.
+impl Port for Listener<'_> {
+    fn up(&mut self, channel: u32) -> Result<Vec<u8>, PortError> {
+        self.port.up(channel)
+    }
+
+    fn down(&mut self, channel: u32, bytes: &[u8]) -> Result<usize, PortError> {
+        self.port.down(channel, bytes)
+    }
+
+    fn reset(&mut self) -> Result<(), PortError> {
+        self.port.reset()
+    }
+
+    fn memory(&mut self, address: u32, into: &mut [u8]) -> Result<(), PortError> {
+        self.port.memory(address, into)
+    }
+
+    fn pass(&mut self) -> Result<(), PortError> {
+        self.port.pass()?;
         let bytes = self.port.up(LOG)?;
         let rows = &mut self.rows;
         self.decoder.read(&bytes, &mut |item| {
@@ -42,21 +56,11 @@ impl Listener<'_> {
                 rows.push(record);
             }
         });
-        Ok(passed)
-    }
-}
-
-impl Wire for Listener<'_> {
-    fn send(&mut self, bytes: &[u8]) -> Result<usize, String> {
-        self.port.down(DOWN, bytes).map_err(|error| error.to_string())
+        Ok(())
     }
 
-    fn receive(&mut self, milliseconds: u32) -> Result<Vec<u8>, String> {
-        let (mut passed, wanted) = (Duration::ZERO, Duration::from_millis(milliseconds.into()));
-        while passed < wanted {
-            passed += self.pass().map_err(|error| error.to_string())?;
-        }
-        self.port.up(UP).map_err(|error| error.to_string())
+    fn now(&self) -> Duration {
+        self.port.now()
     }
 }
 
@@ -81,7 +85,7 @@ impl<'p> Line<'p> {
     }
 
     fn listener(&mut self) -> &mut Listener<'p> {
-        self.client.wire_mut()
+        self.client.port_mut()
     }
 
     /// The parameters on the board.
@@ -92,7 +96,7 @@ impl<'p> Line<'p> {
     /// A word of memory or of a register.
     pub(super) fn word(&mut self, address: u32) -> Result<u32, BringupError> {
         let mut bytes = [0; 4];
-        self.listener().port.memory(address, &mut bytes)?;
+        self.listener().memory(address, &mut bytes)?;
         Ok(u32::from_le_bytes(bytes))
     }
 
@@ -104,16 +108,17 @@ impl<'p> Line<'p> {
         mut each: impl FnMut(&mut Self) -> Result<(), BringupError>,
     ) -> Result<Vec<Record>, BringupError> {
         self.listener().rows.clear();
-        let mut silent = Duration::ZERO;
-        let mut heard = 0;
+        let (mut heard, mut heard_at) = (0, self.listener().now());
         loop {
-            let passed = self.listener().pass()?;
+            self.listener().pass()?;
             each(self)?;
-            let rows = &self.listener().rows;
-            silent = if rows.len() == heard { silent + passed } else { Duration::ZERO };
-            heard = rows.len();
-            if heard >= milliseconds as usize || silent > SILENCE {
-                return Ok(std::mem::take(&mut self.listener().rows));
+            let now = self.listener().now();
+            let rows = &mut self.listener().rows;
+            if rows.len() > heard {
+                (heard, heard_at) = (rows.len(), now);
+            }
+            if heard >= milliseconds as usize || now.saturating_sub(heard_at) > SILENCE {
+                return Ok(std::mem::take(rows));
             }
         }
     }
@@ -223,4 +228,18 @@ pub(super) fn drive(part: f64) -> ServiceDuties {
 /// A duty of the pre-tightener.
 pub(super) fn press(part: f64) -> ServiceDuties {
     ServiceDuties { pretightener: duty(part), ..ServiceDuties::REST }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::probe::Mute;
+
+    #[test]
+    fn a_slow_probe_does_not_stretch_the_wait_for_a_silent_log() {
+        let mut port = Mute::new();
+        let rows = Line::new(&mut port).listen(10).expect("a silent log is no failure");
+        assert!(rows.is_empty());
+        assert!(port.now() < SILENCE + Duration::from_millis(20), "{:?}", port.now());
+    }
 }

@@ -14,6 +14,8 @@ const PORT_B: u32 = 0x4800_0410;
 const STOP_PINS: [(&str, u32); 2] = [("PB12", 12), ("PB7", 7)];
 /// Rows that are judged.
 const ROWS: u32 = 500;
+/// Rows after a sensor is unplugged; the later half is judged.
+const LEAD_ROWS: u32 = 100;
 /// Lowest and highest part of the converter of a sensor that is connected, as the firmware has
 /// them.
 const RANGE: (f64, f64) = (0.02, 0.98);
@@ -222,10 +224,16 @@ fn lead(
     name: &str,
 ) -> Result<Check, BringupError> {
     session.operator.act(Action::Unplug(sensor))?;
-    let rows = session.line.listen(100)?;
+    let rows = session.line.listen(LEAD_ROWS)?;
     let (code, _) = mean(rows.iter().skip(50).map(|row| part(row.codes[place])));
     session.operator.act(Action::Plug(sensor))?;
-    session.line.listen(100)?;
+    session.line.listen(LEAD_ROWS)?;
+    if rows.len() < LEAD_ROWS as usize {
+        let advice = "the log fell silent while the sensor was unplugged: the board, its supply and \
+                      the probe's cable";
+        let measured = format!("{} ticks of {LEAD_ROWS}", rows.len());
+        return Ok(check(name, false, measured, advice));
+    }
     let (other, _) = mean(rows.iter().skip(50).map(|row| part(row.codes[3 - place])));
     let pin = if sensor == Sensor::Preload { "PC2" } else { "PC3" };
     let advice = if code > RANGE.0 && other < RANGE.0 {
@@ -237,4 +245,43 @@ fn lead(
         )
     };
     Ok(check(name, code < RANGE.0, format!("{:.1} % of the converter", 100.0 * code), &advice))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Operator, Question, Seen};
+    use super::*;
+    use crate::bringup::Line;
+    use crate::probe::Mute;
+    use crate::scenario::Scenario;
+
+    struct Hand;
+
+    impl Operator for Hand {
+        fn confirm(&mut self, _: &str) -> Result<(), BringupError> {
+            Ok(())
+        }
+
+        fn act(&mut self, _: Action) -> Result<(), BringupError> {
+            Ok(())
+        }
+
+        fn look(&mut self, _: Question) -> Result<Seen, BringupError> {
+            Ok(Seen::Nothing)
+        }
+    }
+
+    #[test]
+    fn a_silent_log_proves_no_pull_down() {
+        let (mut port, expected) = (Mute::new(), Scenario::default());
+        let mut session = Session {
+            line: &mut Line::new(&mut port),
+            operator: &mut Hand,
+            expected: &expected,
+            proposed: &mut expected.clone(),
+            say: &mut |_| {},
+        };
+        let found = lead(&mut session, Sensor::Preload, 1, "preload lead").expect("a verdict");
+        assert!(!found.ok && found.advice.contains("silent"), "{found:?}");
+    }
 }

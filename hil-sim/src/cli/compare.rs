@@ -2,13 +2,12 @@
 
 use serde_json::{Value, json};
 
+use super::campaign::CampaignArgs;
 use super::failure::{Failure, Outcome};
-use super::output;
-use super::scenario::{RunArgs, seeds_fit};
-use crate::compare::{self, Comparison, Entry};
+use super::scenario::RunArgs;
+use crate::campaign::{Column, Frame, column};
+use crate::compare::{self, Comparison, Entry, STRATEGIES};
 use crate::oracle::Effort;
-use crate::progress;
-use crate::table::{number, plain};
 
 /// Compares four preload strategies on the same random rigs: scheduled, constant at cruise,
 /// constant at the limit, reactive; and the oracle, the best run that the plants allow.
@@ -33,69 +32,49 @@ pub(super) struct Args {
     #[command(flatten)]
     run: RunArgs,
 
-    /// Prints the outcome as one JSON object.
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    pub(super) campaign: CampaignArgs,
 }
 
 pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     args.run.no_controller("every strategy is compared")?;
     let scenario = args.run.resolve()?;
-    seeds_fit(&scenario, args.count)?;
-    let rigs = args.count as usize;
-    let mut comparison = {
-        let bar = progress::bar("runs at most", compare::most_runs(rigs) as u64);
-        compare::compare(&scenario, scenario.run.seed + 1, rigs, &|| bar.advance(1))?
-    };
-    if !args.no_oracle {
-        let bar = progress::bar("plants of the oracle", rigs as u64);
-        comparison.add_oracle(&scenario, Effort::Full, &|| bar.advance(1))?;
-    }
-    output::result(args.json, &machine(&comparison), || human(&comparison))?;
-    Ok(Outcome::Good)
+    let effort = (!args.no_oracle).then_some(Effort::Full);
+    let campaign = compare::campaign(&scenario, scenario.seeds(args.count)?, effort)?;
+    let found = args.campaign.carry_out(scenario.to_toml(), campaign)?;
+    let comparison = &found.outcome;
+    let rows = Frame::of(&COLUMNS, comparison.entries.iter().map(|entry| row(entry, comparison)));
+    let text = || human(comparison, &rows);
+    found.print(&args.campaign, comparison, &rows, text, true)
 }
 
-/// The JSON object.
-fn machine(comparison: &Comparison) -> Value {
-    json!({
-        "runs": comparison.runs,
-        "gap_ref_mm": comparison.gap_ref_mm,
-        "entries": comparison.entries,
-    })
+/// Columns of the strategies.
+const COLUMNS: [Column; 11] = [
+    column("controller", "controller", "", 0),
+    column("duration_s", "command", "s", 3),
+    column("duration_ratio", "ratio", "", 3),
+    column("moving_s", "moving", "s", 3),
+    column("moving_ratio", "ratio", "", 3),
+    column("worst_gap_mm", "gap", "mm", 3),
+    column("least_slip_margin", "margin", "", 3),
+    column("slip_events", "slips", "", 0),
+    column("incomplete", "short", "", 0),
+    column("mean_preload_n", "mean", "N", 1),
+    column("gap_reserve_percent", "reserve", "%", 1),
+];
+
+/// An entry with its times over the scheduled strategy's.
+fn row(entry: &Entry, of: &Comparison) -> Value {
+    let scheduled = of.entries.iter().find(|e| e.controller == STRATEGIES[0].name());
+    let ratio = |time: fn(&Entry) -> Option<f64>| Some(time(entry)? / time(scheduled?)?);
+    let mut row = json!(entry);
+    row["duration_ratio"] = ratio(|entry| entry.duration_s).into();
+    row["moving_ratio"] = ratio(|entry| entry.moving_s).into();
+    row["gap_reserve_percent"] = entry.gap_reserve.map(|reserve| 100.0 * reserve).into();
+    row
 }
 
-fn human(comparison: &Comparison) -> String {
-    let head = [
-        "controller",
-        "command s (ratio)",
-        "in motion s (ratio)",
-        "gap mm",
-        "margin",
-        "slips",
-        "short",
-        "mean N",
-        "reserve",
-    ];
-    let scheduled = &comparison.entries[0];
-    let rows = comparison.entries.iter().map(|entry| {
-        let mark = if entry.tuned { "" } else { "~" };
-        let time = |of: fn(&Entry) -> Option<f64>| {
-            let ratio = of(entry).zip(of(scheduled)).map(|(this, reference)| this / reference);
-            format!("{} ({})", number(of(entry), 3), number(ratio, 3))
-        };
-        let reserve = entry.gap_reserve.map(|reserve| format!("{:.1} %", reserve * 100.0));
-        vec![
-            entry.controller.to_owned(),
-            time(|entry| entry.duration_s),
-            time(|entry| entry.moving_s),
-            format!("{mark}{}", number(entry.worst_gap_mm, 3)),
-            number(entry.least_slip_margin, 3),
-            entry.slip_events.to_string(),
-            entry.incomplete.to_string(),
-            number(entry.mean_preload_n, 1),
-            reserve.unwrap_or_else(|| "-".to_owned()),
-        ]
-    });
+fn human(comparison: &Comparison, rows: &Frame) -> String {
     let mut text = format!(
         "{} rigs, each strategy tuned to a worst gap of {:.3} mm\n{}\ncommand: from the accepted \
          command to arrival; moving: the wheel moves; means over completed runs,\nwith their \
@@ -103,10 +82,10 @@ fn human(comparison: &Comparison) -> String {
          short: incomplete runs. reserve: how far below the reference gap the planner aims.\n",
         comparison.runs,
         comparison.gap_ref_mm,
-        plain(&head, rows)
+        rows.text().trim_end()
     );
-    if comparison.entries.iter().any(|entry| !entry.tuned) {
-        text += "~ could not be brought to the reference gap by its reserve\n";
+    for entry in comparison.entries.iter().filter(|entry| !entry.tuned) {
+        text += &format!("{}: no reserve brings it to the reference gap\n", entry.controller);
     }
     if comparison.entries.iter().any(|entry| entry.controller == compare::ORACLE) {
         text += "oracle: the fastest run found for each plant, all of it known in advance, with \

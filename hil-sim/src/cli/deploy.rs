@@ -37,15 +37,8 @@ pub struct Args {
 
     /// With --target board: the plant is in the loop as with --target probe, not at the
     /// board's pins.
-    #[arg(long, conflicts_with = "board_fault")]
+    #[arg(long)]
     pub hil: bool,
-
-    /// Fault of the emulated board's hardware and its time, may be repeated:
-    /// preload-sensor=0x8000@5.2, compression-sensor=CODE, angle-bits=MASK, angle-lost,
-    /// encoder-line-a, encoder-line-b, dma-stalled, timer-flags, brown-out, supply-cut, supply-dip
-    /// or flip=ADDRESS.BIT, each at its seconds from power-up.
-    #[arg(long, value_name = "FAULT@S")]
-    pub board_fault: Vec<String>,
 
     /// Shows the controller's log on standard error.
     #[arg(long)]
@@ -82,11 +75,9 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let (scenario, directory) = args.resolve()?;
     match args.target.as_str() {
         "board" => return Ok(Outcome::Code(provision::go_on(Extra::Board)?)),
-        "probe" => {
-            takes_board(args)?;
-            return looped::on_probe(args, &scenario, directory.as_deref());
-        }
-        _ => takes_board(args)?,
+        "probe" => return looped::on_probe(args, &scenario, directory.as_deref()),
+        _ if args.hil => return Err(Failure::input("--hil: takes --target board")),
+        _ => {}
     }
     let recording = {
         let _progress = progress::spinner(scenario.run.direction.name());
@@ -149,16 +140,6 @@ fn identity(summary: Option<Value>) -> Option<Value> {
 pub fn read(path: &Path) -> Result<Vec<u8>, Failure> {
     let read = std::fs::read(path);
     Ok(read.map_err(|source| FirmwareError::Read { path: path.to_owned(), source })?)
-}
-
-/// Refuses options that need the emulated board.
-fn takes_board(args: &Args) -> Result<(), Failure> {
-    let fault = args.board_fault.first().map(|fault| format!("--board-fault {fault}"));
-    let hil = (args.hil && args.target == "sil").then(|| "--hil".to_owned());
-    match fault.or(hil) {
-        Some(option) => Err(Failure::input(format!("{option}: takes --target board"))),
-        None => Ok(()),
-    }
 }
 
 /// Where the files go: as given, or named after the run.
@@ -272,16 +253,5 @@ mod tests {
         assert_ne!(one, other);
         let text = one.file_name().unwrap().to_str().unwrap();
         assert!(text.len() < 120 && !text.contains(['/', '"', ' ', '{']), "{text}");
-    }
-
-    #[test]
-    fn options_of_the_emulated_board_are_refused_elsewhere() {
-        for (arguments, named) in [
-            ("--hil", "--hil"),
-            ("--target probe --board-fault encoder-line-a@1", "--board-fault encoder-line-a@1"),
-        ] {
-            let error = takes_board(&parsed(arguments)).unwrap_err().to_string();
-            assert_eq!(error, format!("{named}: takes --target board"));
-        }
     }
 }

@@ -5,13 +5,15 @@ use std::path::PathBuf;
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
+use super::campaign::CampaignArgs;
 use super::failure::{Failure, Outcome};
 use super::output::{self, WithFiles};
 use super::scenario::RunArgs;
+use crate::campaign::{Column, Frame, column};
 use crate::compare::STRATEGIES;
 use crate::envelope::{self, Cell, Envelope, Grid};
 use crate::files::{make_directory, write_text};
-use crate::progress;
+use crate::scenario::ControllerKind;
 use crate::table::{number, plain};
 
 /// Over friction (0.6 to 1.3) and load on this wheel (0 to 30 N): which preload strategy
@@ -37,9 +39,8 @@ pub(super) struct Args {
     #[arg(long, conflicts_with = "out")]
     no_files: bool,
 
-    /// Prints the outcome as one JSON object.
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    pub(super) campaign: CampaignArgs,
 }
 
 /// What `--json` prints.
@@ -60,25 +61,36 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
         let path = args.out.display();
         return Err(Failure::input(format!("--out {path}: exists and is not a directory")));
     }
-    let found = {
-        let bar = progress::bar("runs", args.grid.runs() as u64);
-        envelope::envelope(&scenario, args.grid, &|| bar.advance(1))?
-    };
+    let campaign = envelope::campaign(&scenario, args.grid)?;
+    let carried_out = args.campaign.carry_out(scenario.to_toml(), campaign)?;
+    let found = &carried_out.outcome;
     let mut files = Vec::new();
     if !args.no_files {
         make_directory(&args.out)?;
         let path = args.out.join("envelope.svg");
-        write_text(&path, &envelope::picture(&found))?;
+        write_text(&path, &envelope::picture(found))?;
         files.push(path);
     }
-    let printed = machine(&found);
+    let printed = machine(found);
     let printed = WithFiles { result: &printed, files: &files };
-    output::result(args.json, &printed, || human(&found) + &output::wrote(&files))?;
-    Ok(Outcome::Good)
+    let text = || human(found) + &output::wrote(&files);
+    let rows = Frame::of(&COLUMNS, &found.cells);
+    carried_out.print(&args.campaign, &printed, &rows, text, true)
 }
 
+/// Columns of the cells.
+const COLUMNS: [Column; 7] = [
+    column("friction", "friction", "", 2),
+    column("load_n", "load", "N", 1),
+    column("known", "known", "", 0),
+    column("controller", "controller", "", 0),
+    column("completed", "completed", "", 0),
+    column("slip_mm", "slip", "mm", 3),
+    column("duration_s", "duration", "s", 3),
+];
+
 fn machine(found: &Envelope) -> Printed<'_> {
-    let area = |name: &str| (name.to_owned(), json!(found.area(name)));
+    let area = |kind: ControllerKind| (kind.name().to_owned(), json!(found.area(kind)));
     let missing = found.not_contained();
     let place = |cell: &&Cell| {
         let Cell { friction, load_n, known, controller, .. } = *cell;
@@ -86,7 +98,7 @@ fn machine(found: &Envelope) -> Printed<'_> {
     };
     Printed {
         grid: &found.cells,
-        area: STRATEGIES.iter().map(|kind| area(kind.name())).collect(),
+        area: STRATEGIES.into_iter().map(area).collect(),
         scheduled_contains_all: missing.is_empty(),
         not_contained: missing.iter().map(place).collect(),
     }
@@ -95,11 +107,16 @@ fn machine(found: &Envelope) -> Printed<'_> {
 fn human(found: &Envelope) -> String {
     let head = ["controller", "known", "unknown", "time known", "time unknown"];
     let rows = STRATEGIES.map(|kind| {
-        let name = kind.name();
-        let area = found.area(name);
+        let area = found.area(kind);
         let percent = |part: f64| format!("{:.1} %", 100.0 * part);
-        let ratio = |known| number(found.time_ratio(name, known), 3);
-        vec![name.to_owned(), percent(area.known), percent(area.unknown), ratio(true), ratio(false)]
+        let ratio = |known| number(found.time_ratio(kind, known), 3);
+        vec![
+            kind.name().to_owned(),
+            percent(area.known),
+            percent(area.unknown),
+            ratio(true),
+            ratio(false),
+        ]
     });
     let mut text = format!(
         "Part of the grid in which each strategy completes without slip, and its time over the\n\
@@ -127,7 +144,7 @@ fn letters(found: &Envelope, known: bool) -> comfy_table::Table {
                 (cell.friction, cell.load_n, cell.known) == (*friction, *load_n, known)
                     && cell.good()
             });
-            good.map(|cell| &cell.controller[..1]).collect::<String>()
+            good.map(|cell| &cell.controller.name()[..1]).collect::<String>()
         };
         std::iter::once(number(*load_n, 1)).chain(found.frictions.iter().map(at)).collect()
     });
@@ -145,7 +162,8 @@ fn contained(found: &Envelope) -> String {
         "The scheduled strategy does not complete without slip where another does:\n".to_owned();
     for Cell { friction, load_n, known, controller, .. } in missing {
         let known = if *known { "known" } else { "unknown" };
-        text += &format!("  friction {friction:.2}, load {load_n:.1} N, {known}: {controller}\n");
+        text += &format!("  friction {friction:.2}, load {load_n:.1} N, {known}: ");
+        text += &format!("{}\n", controller.name());
     }
     text
 }

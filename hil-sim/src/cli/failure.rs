@@ -1,5 +1,6 @@
 //! Result of a verb.
 
+use std::convert::Infallible;
 use std::fmt;
 use std::process::ExitCode;
 
@@ -79,49 +80,25 @@ pub fn one_line(text: &str) -> String {
     lines.collect::<Vec<_>>().join(" ")
 }
 
-impl From<ScenarioError> for Failure {
-    fn from(error: ScenarioError) -> Self {
-        Self::input(error)
-    }
+/// Errors that are a failure of this kind.
+macro_rules! failures {
+    ($kind:ident: $($error:ty),*) => {$(
+        impl From<$error> for Failure {
+            fn from(error: $error) -> Self {
+                Self::$kind(error.to_string())
+            }
+        }
+    )*};
 }
-
-impl From<RigError> for Failure {
-    fn from(error: RigError) -> Self {
-        Self::input(error)
-    }
-}
-
-impl From<FileError> for Failure {
-    fn from(error: FileError) -> Self {
-        Self::input(error)
-    }
-}
+failures!(Input: ScenarioError, RigError, FileError);
+failures!(Run: BalanceError, FirmwareError, ProvisionError, Infallible);
 
 impl From<RunError> for Failure {
     fn from(error: RunError) -> Self {
         match error {
-            RunError::Rig(error) => error.into(),
-            RunError::Refused(_) | RunError::Hardware(_) => Self::input(error),
+            RunError::Rig(_) | RunError::Refused(_) | RunError::Hardware(_) => Self::input(error),
             RunError::Plant(_) => Self::run(error),
         }
-    }
-}
-
-impl From<BalanceError> for Failure {
-    fn from(error: BalanceError) -> Self {
-        Self::run(error)
-    }
-}
-
-impl From<FirmwareError> for Failure {
-    fn from(error: FirmwareError) -> Self {
-        Self::run(error)
-    }
-}
-
-impl From<ProvisionError> for Failure {
-    fn from(error: ProvisionError) -> Self {
-        Self::run(error)
     }
 }
 

@@ -1,13 +1,20 @@
 //! `rig faults`: every fault at random instants, and its outcome.
 
+use std::fmt::Display;
+
+use serde_json::json;
+
+use super::campaign::CampaignArgs;
 use super::failure::{Failure, Outcome};
+use super::montecarlo;
 use super::scenario::ScenarioArgs;
-use super::{montecarlo, output};
-use crate::faults::campaign::{Campaign, Case, MatrixRow, Outcome as Matrix};
-use crate::montecarlo::Shard;
+use crate::campaign::{Column, Frame, column};
+use crate::faults::campaign::twin::Twin;
+use crate::faults::campaign::{
+    Case, FaultCampaign, Instant, MatrixRow, Outcome as Matrix, watched,
+};
 use crate::progress;
-use crate::scenario::nearest_word;
-use crate::table::{number, plain};
+use crate::scenario::{Scenario, nearest_word};
 
 /// Breaks everything that can break, each fault at random instants of random rigs, out and
 /// back, and judges the outcome by the true state of the plant.
@@ -35,25 +42,20 @@ pub struct Args {
           value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     clean: Option<u64>,
 
-    /// Only part i of n of the faults, or of the deployments without one.
-    #[arg(long, value_name = "i/n", default_value_t = Shard::ALL)]
-    shard: Shard,
-
     #[command(flatten)]
     scenario: ScenarioArgs,
 
-    /// Prints the outcome as one JSON object.
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    pub(super) campaign: CampaignArgs,
 }
 
 impl Args {
     /// The campaign that is asked for.
-    pub fn campaign(&self) -> Result<Campaign, Failure> {
+    pub fn campaign(&self) -> Result<FaultCampaign, Failure> {
         let board = self.target == "board";
         let all = if board { Case::all_on_board() } else { Case::all() };
-        let wanted: Vec<Case> = all.iter().filter(|c| c.is_one_of(&self.only)).copied().collect();
-        if wanted.is_empty() {
+        let cases: Vec<Case> = all.iter().filter(|c| c.is_one_of(&self.only)).copied().collect();
+        if cases.is_empty() {
             let names: Vec<String> = all.iter().map(Case::name).collect();
             let first = |name: &String| name.split(' ').next().unwrap_or_default().to_owned();
             let words: Vec<String> = names.iter().map(first).chain(names.clone()).collect();
@@ -65,10 +67,10 @@ impl Args {
             let (text, names) = (self.only.join(", "), names.join(", "));
             return Err(Failure::input(format!("--only {text}: no such fault; faults: {names}")));
         }
-        let cases = (0..).zip(wanted).filter(|(index, _)| self.shard.has(*index));
-        let cases: Vec<Case> = cases.map(|(_, case)| case).collect();
-        montecarlo::shard_has(self.shard, cases.len())?;
-        Ok(Campaign { scenario: self.scenario.resolve()?, instants: self.count as usize, cases })
+        let scenario = self.scenario.resolve()?;
+        // Every rig can have its seed.
+        scenario.seeds(self.count)?;
+        Ok(FaultCampaign { scenario, instants: self.count as usize, cases })
     }
 }
 
@@ -78,60 +80,79 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
         return clean(args, count);
     }
     let campaign = args.campaign()?;
-    if args.target == "board" {
+    if args.target == "board" && !args.campaign.is_given() {
         return Ok(Outcome::Code(crate::provision::go_on(crate::provision::Extra::Board)?));
     }
-    let outcome = {
-        let bar = progress::bar("runs", campaign.runs());
-        campaign.run(&|| bar.advance(1))?
-    };
-    ended(args, &outcome)
+    carry_out(args, &campaign, Twin::run, watched)
 }
 
-/// Prints the outcome.
-pub fn ended(args: &Args, outcome: &Matrix) -> Result<Outcome, Failure> {
-    output::result(args.json, outcome, || human(outcome))?;
-    Ok(Outcome::of(outcome.is_good()))
+/// Runs the campaign on the target that is asked for, and prints the outcome.
+pub fn carry_out<E: Display + Send>(
+    args: &Args,
+    campaign: &FaultCampaign,
+    twin: impl Fn(&Scenario) -> Result<Twin, E> + Sync,
+    watched: impl Fn(&Scenario, &Twin) -> Result<Instant, E> + Sync,
+) -> Result<Outcome, Failure>
+where
+    Failure: From<E>,
+{
+    let rigs = if args.campaign.is_given() {
+        Vec::new()
+    } else {
+        let bar = progress::bar("runs without a fault", args.count);
+        campaign.rigs(twin, &|| bar.advance(1))?
+    };
+    let target = if args.target == "board" { "board" } else { "sil" };
+    let parameters = campaign.scenario.to_toml();
+    let found = args.campaign.carry_out(parameters, campaign.on(target, &rigs, watched))?;
+    let outcome = &found.outcome;
+    let row = |line: &MatrixRow| {
+        let mut row = json!(line);
+        row["reported"] = line.code.map_or_else(|| json!(line.restarted()), |code| json!(code));
+        row["detections"] = (line.found + line.limited).into();
+        row
+    };
+    let rows = Frame::of(&COLUMNS, outcome.matrix.iter().map(row));
+    found.print(&args.campaign, outcome, &rows, || human(outcome, &rows), outcome.is_good())
 }
+
+/// Columns of the matrix.
+const COLUMNS: [Column; 11] = [
+    column("fault", "fault", "", 0),
+    column("reported", "code", "", 0),
+    column("detections", "found", "", 0),
+    column("otherwise", "found as\nelse", "", 0),
+    column("tolerated", "tolerated", "", 0),
+    column("undetected", "missed", "", 0),
+    column("unsafe", "unsafe", "", 0),
+    column("latency_median_ms", "median", "ms", 0),
+    column("latency_ms", "worst", "ms", 0),
+    column("worst_preload_n", "preload", "N", 1),
+    column("worst_motion_mm", "motion", "mm", 2),
+];
 
 /// Random deployments without a fault.
 fn clean(args: &Args, count: u64) -> Result<Outcome, Failure> {
-    let outcome = montecarlo::campaign(&args.scenario.resolve()?, args.shard, count)?;
-    let alarms = outcome.faults.len();
-    output::result(args.json, &outcome, || {
-        format!(
-            "{} deployments without a fault: {alarms} false alarms, {} incomplete\n{}",
-            outcome.runs,
-            outcome.runs - outcome.completed,
-            montecarlo::human(&outcome)
-        )
-    })?;
-    Ok(Outcome::of(alarms == 0 && outcome.completed == outcome.runs))
+    let found = montecarlo::deployments(&args.campaign, &args.scenario.resolve()?, count)?;
+    let (_, outcome) = &found;
+    let (alarms, incomplete) = (outcome.faults.len(), outcome.runs - outcome.completed);
+    let head = format!(
+        "{} deployments without a fault: {alarms} false alarms, {incomplete} incomplete\n",
+        outcome.runs
+    );
+    montecarlo::print(&found, &args.campaign, &head, alarms == 0 && incomplete == 0)
 }
 
 /// The matrix as a table, with what failed below it.
-fn human(outcome: &Matrix) -> String {
-    let head = [
-        "fault",
-        "code",
-        "found",
-        "found as\nelse",
-        "tolerated",
-        "missed",
-        "unsafe",
-        "median\nms",
-        "worst\nms",
-        "preload\nN",
-        "motion\nmm",
-    ];
+fn human(outcome: &Matrix, rows: &Frame) -> String {
     let mut text = format!(
-        "{} faults at {} instants each: {} found as something else, {} undetected, {} unsafe\n{}\n",
+        "{} faults at {} instants each: {} found as something else, {} undetected, {} unsafe\n{}",
         outcome.matrix.len(),
         outcome.instants,
         outcome.otherwise,
         outcome.undetected,
         outcome.unheld,
-        plain(&head, outcome.matrix.iter().map(row))
+        rows.text()
     );
     for line in &outcome.matrix {
         for failure in &line.failures {
@@ -148,21 +169,4 @@ fn human(outcome: &Matrix) -> String {
         }
     }
     text
-}
-
-fn row(line: &MatrixRow) -> Vec<String> {
-    let count = |n: usize| if n == 0 { "-".to_owned() } else { n.to_string() };
-    vec![
-        line.fault.clone(),
-        line.code.map_or_else(|| line.restarted().unwrap_or("-").to_owned(), |c| c.to_string()),
-        count(line.found + line.limited),
-        count(line.otherwise),
-        count(line.tolerated),
-        count(line.undetected),
-        count(line.unheld),
-        number(line.latency_median_ms, 0),
-        number(line.latency_ms, 0),
-        number(line.worst_preload_n, 1),
-        number(line.worst_motion_mm, 2),
-    ]
 }

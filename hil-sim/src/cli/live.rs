@@ -12,7 +12,7 @@ use super::log_files::{LogFiles, Stop};
 use super::output;
 use super::source::SourceArgs;
 use crate::live::{Known, Screen, Server};
-use crate::record::{Counts, Decoder, Item, Source, messages};
+use crate::record::{Decoder, Item, Source, messages};
 use crate::scenario::Scenario;
 
 /// Time between two frames of the screen.
@@ -65,46 +65,6 @@ impl Drop for Display {
     }
 }
 
-/// Reads a log, and keeps it if that is asked for.
-enum Reader {
-    Shown(Box<Decoder>),
-    Kept(Box<LogFiles>),
-}
-
-impl Reader {
-    fn take(&mut self, bytes: &[u8], see: &mut impl FnMut(&Item)) -> Result<(), Failure> {
-        match self {
-            Self::Shown(decoder) => {
-                decoder.read(bytes, &mut |item| see(&item));
-                Ok(())
-            }
-            Self::Kept(files) => files.take(bytes, see),
-        }
-    }
-
-    const fn counts(&self) -> &Counts {
-        match self {
-            Self::Shown(decoder) => decoder.counts(),
-            Self::Kept(files) => files.counts(),
-        }
-    }
-
-    fn news(&mut self) -> Vec<String> {
-        match self {
-            Self::Shown(_) => Vec::new(),
-            Self::Kept(files) => files.news(),
-        }
-    }
-
-    /// Completes the files.
-    fn finish(self) -> Result<(Counts, Vec<PathBuf>), Failure> {
-        match self {
-            Self::Shown(decoder) => Ok((*decoder.counts(), Vec::new())),
-            Self::Kept(files) => files.finish(&mut |_| {}),
-        }
-    }
-}
-
 /// Shows what `source` gives until it ends or the operator quits.
 pub fn watch(
     args: &Args,
@@ -114,14 +74,12 @@ pub fn watch(
     let server = Server::bind(&args.listen)
         .map_err(|error| Failure::input(format!("--listen {}: {error}", args.listen)))?;
     let mut places = format!("ws://{}", server.address());
-    let mut reader = match &args.record {
-        Some(folder) => {
-            let files = LogFiles::new(folder, None, false, scenario)?;
-            places += &format!("   recorded to {}", files.mcap().display());
-            Reader::Kept(Box::new(files))
-        }
-        None => Reader::Shown(Box::default()),
-    };
+    let folder = args.record.as_deref();
+    let files = folder.map(|folder| LogFiles::new(folder, None, false, scenario));
+    let (mut files, mut decoder) = (files.transpose()?, Decoder::new());
+    if let Some(files) = &files {
+        places += &format!("   recorded to {}", files.mcap().display());
+    }
     if args.headless {
         eprintln!("listening at {places}");
     }
@@ -136,19 +94,22 @@ pub fn watch(
     let mut clock = Clock::new(args.fast);
     let mut drawn = Instant::now();
     while let Some(bytes) = source.read().map_err(Failure::run)? {
-        reader.take(&bytes, &mut |item| {
-            screen.see(item);
-            if let Item::Tick(record, _) = item {
+        if let Some(files) = &mut files {
+            files.take(&bytes, &mut |_| {})?;
+        }
+        decoder.read(&bytes, &mut |item| {
+            screen.see(&item);
+            if let Item::Tick(record, _) = &item {
                 clock.tick(record.at());
             }
-            if let Some((topic, body)) = messages(item) {
+            if let Some((topic, body)) = messages(&item) {
                 server.publish(topic, clock.now_ns(), body);
             }
-        })?;
-        for line in source.news().into_iter().chain(reader.news()) {
+        });
+        for line in source.news().into_iter().chain(files.iter_mut().flat_map(LogFiles::news)) {
             screen.note(line);
         }
-        screen.count(reader.counts());
+        screen.count(decoder.counts());
         clock.wait();
         if stop.as_ref().is_some_and(Stop::is_wanted) {
             break;
@@ -158,7 +119,7 @@ pub fn watch(
         }
         drawn = Instant::now();
         if let Some(Display(terminal)) = &mut display {
-            let drawn = terminal.draw(|frame| screen.draw(frame, reader.counts()));
+            let drawn = terminal.draw(|frame| screen.draw(frame, decoder.counts()));
             drawn.map_err(Failure::run)?;
             let letters = keys()?;
             for letter in letters.iter().filter(|letter| **letter != QUIT) {
@@ -170,9 +131,11 @@ pub fn watch(
         }
     }
     drop(display);
-    let (counts, files) = reader.finish()?;
-    output::print(&output::wrote(&files))?;
-    Ok(Outcome::of(counts.is_complete()))
+    if let Some(files) = files {
+        output::print(&output::wrote(&files.finish(&mut |_| {})?.1))?;
+    }
+    decoder.finish(&mut |_| {});
+    Ok(Outcome::of(decoder.counts().is_complete()))
 }
 
 /// Key that ends the view; Escape and Ctrl-C do too.

@@ -1,10 +1,12 @@
 //! `rig montecarlo`: many random rigs.
 
+use serde_json::json;
+
+use super::campaign::{CampaignArgs, Found};
 use super::failure::{Failure, Outcome};
-use super::output;
-use super::scenario::{RunArgs, seeds_fit};
-use crate::montecarlo::{self, Least, Quantiles, Shard};
-use crate::progress;
+use super::scenario::RunArgs;
+use crate::campaign::{Column, Frame, column};
+use crate::montecarlo::{self, Least, RunLine};
 use crate::scenario::{MismatchDraw, Scenario};
 use crate::table::{number, plain};
 
@@ -25,21 +27,21 @@ pub(super) struct Args {
           value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     count: u64,
 
-    /// Runs only every n-th seed, beginning with the i-th.
-    #[arg(long, value_name = "I/N", default_value_t = Shard::ALL)]
-    shard: Shard,
-
     #[command(flatten)]
     run: RunArgs,
 
-    /// Prints the outcome as one JSON object.
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    pub(super) campaign: CampaignArgs,
 }
 
 pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     let scenario = args.run.resolve()?;
-    let outcome = campaign(&scenario, args.shard, args.count)?;
+    let found = deployments(&args.campaign, &scenario, args.count)?;
+    let (_, outcome) = &found;
+    let sound = match scenario.run.mismatch {
+        MismatchDraw::Adversarial => outcome.unreported.is_empty(),
+        _ => outcome.completed == outcome.runs,
+    };
     let head = format!(
         "{} runs of {}, {} controller, rig {}: {} completed, {} slip events\n",
         outcome.runs,
@@ -49,39 +51,50 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
         outcome.completed,
         outcome.slip_events
     );
-    output::result(args.json, &outcome, || head + &human(&outcome))?;
-    let sound = match scenario.run.mismatch {
-        MismatchDraw::Adversarial => outcome.unreported.is_empty(),
-        _ => outcome.completed == outcome.runs,
-    };
-    Ok(Outcome::of(sound))
+    print(&found, &args.campaign, &head, sound)
 }
 
-/// Refuses a part of a campaign in which nothing is left to run.
-pub(super) fn shard_has(shard: Shard, items: usize) -> Result<(), Failure> {
-    if items == 0 {
-        let why = "the campaign has fewer runs than parts, and none for this one";
-        return Err(Failure::input(format!("--shard {shard}: {why}")));
-    }
-    Ok(())
-}
-
-/// Runs this part of `count` rigs, with a progress bar.
-pub(super) fn campaign(
+/// Runs `count` rigs, or the part of them that is asked for: the runs, and their outcome.
+pub(super) fn deployments(
+    args: &CampaignArgs,
     scenario: &Scenario,
-    shard: Shard,
     count: u64,
-) -> Result<montecarlo::Outcome, Failure> {
-    seeds_fit(scenario, count)?;
-    let seeds = shard.seeds(scenario.run.seed, count);
-    shard_has(shard, seeds.len())?;
-    let bar = progress::bar("runs", seeds.len() as u64);
-    let lines = montecarlo::run(scenario, &seeds, &|| bar.advance(1))?;
-    Ok(montecarlo::Outcome::of(&lines).drawn_from(scenario, &seeds))
+) -> Result<(Found<Vec<RunLine>>, montecarlo::Outcome), Failure> {
+    let campaign = montecarlo::campaign(scenario, scenario.seeds(count)?);
+    let found = args.carry_out(scenario.to_toml(), campaign)?;
+    let seeds: Vec<u64> = found.outcome.iter().map(|line| line.seed).collect();
+    let outcome = montecarlo::Outcome::of(&found.outcome).drawn_from(scenario, &seeds);
+    Ok((found, outcome))
 }
 
-pub(super) fn human(outcome: &montecarlo::Outcome) -> String {
-    let mut text = format!("{}\n", figures(outcome));
+/// Prints the outcome of these runs behind this head.
+pub(super) fn print(
+    (found, outcome): &(Found<Vec<RunLine>>, montecarlo::Outcome),
+    args: &CampaignArgs,
+    head: &str,
+    good: bool,
+) -> Result<Outcome, Failure> {
+    let rows = Frame::of(&COLUMNS, &found.outcome);
+    found.print(args, outcome, &rows, || head.to_owned() + &human(outcome), good)
+}
+
+/// Columns of the runs.
+const COLUMNS: [Column; 11] = [
+    column("seed", "seed", "", 0),
+    column("completed", "completed", "", 0),
+    column("duration_s", "from the command", "s", 3),
+    column("moving_s", "in motion", "s", 3),
+    column("max_gap_mm", "worst gap", "mm", 3),
+    column("gap_over_ref", "gap over reference", "", 4),
+    column("end_off_mm", "off the commanded end", "mm", 3),
+    column("slip_events", "slip events", "", 0),
+    column("least_lead_s", "lead", "s", 3),
+    column("least_slip_margin", "slip margin", "", 3),
+    column("mean_preload_n", "mean preload", "N", 2),
+];
+
+fn human(outcome: &montecarlo::Outcome) -> String {
+    let mut text = figures(outcome).text();
     for fault in &outcome.faults {
         let code = fault.code.map_or("failure".to_owned(), |code| format!("fault {code}"));
         text += &format!("  {code} in seed {}: {}\n", fault.seed, fault.text);
@@ -122,40 +135,38 @@ pub(super) fn human(outcome: &montecarlo::Outcome) -> String {
     text
 }
 
-fn figures(outcome: &montecarlo::Outcome) -> comfy_table::Table {
-    let dash = || "-".to_owned();
-    let seed = |seed: Option<u64>| seed.map_or_else(dash, |seed| seed.to_string());
-    let spread = |name: &str, figure: Option<Quantiles>, decimals| {
-        let number = |pick: fn(Quantiles) -> f64| number(figure.map(pick), decimals);
-        let quantiles =
-            [number(|f| f.p50), number(|f| f.p95), number(|f| f.p99), number(|f| f.max)];
-        let seed = seed(figure.map(|f| f.seed));
-        [vec![name.to_owned()], quantiles.to_vec(), vec![seed]].concat()
-    };
-    let least = |name: &str, figure: Option<Least>| {
-        let worst = number(figure.map(|f| f.min), 3);
-        vec![name.to_owned(), dash(), dash(), dash(), worst, seed(figure.map(|f| f.seed))]
-    };
-    let gap = number(outcome.worst_gap_mm, 3);
-    let found = outcome
-        .steps_found
-        .iter()
-        .map(|step| spread(&format!("step {} found off by, mm", step.index), Some(step.off_mm), 3));
-    let head = ["", "median", "95 %", "99 %", "worst", "its seed"];
-    plain(
-        &head,
-        [
-            spread("from the command, s", outcome.duration_s, 2),
-            spread("in motion, s", outcome.moving_s, 2),
-            spread("gap over reference", outcome.gap_over_ref, 3),
-            spread("  at the first step", outcome.first_gap_over_ref, 3),
-            spread("  at the later ones", outcome.later_gap_over_ref, 3),
-            vec!["gap, mm".to_owned(), dash(), dash(), dash(), gap, seed(outcome.worst_gap_seed)],
-            least("lead time, s", outcome.lead_time_s),
-            least("slip margin", outcome.slip_margin),
-            spread("off the commanded end, mm", outcome.end_off_mm, 3),
-        ]
-        .into_iter()
-        .chain(found),
+/// Columns of the figures.
+const FIGURES: [Column; 6] = [
+    column("figure", "", "", 0),
+    column("p50", "median", "", 3),
+    column("p95", "95 %", "", 3),
+    column("p99", "99 %", "", 3),
+    column("max", "worst", "", 3),
+    column("seed", "its seed", "", 0),
+];
+
+fn figures(outcome: &montecarlo::Outcome) -> Frame {
+    let worst = |value: Option<f64>, seed: Option<u64>| json!({ "max": value, "seed": seed });
+    let least = |least: Option<Least>| worst(least.map(|l| l.min), least.map(|l| l.seed));
+    let rows = [
+        ("from the command, s", json!(outcome.duration_s)),
+        ("in motion, s", json!(outcome.moving_s)),
+        ("gap over reference", json!(outcome.gap_over_ref)),
+        ("  at the first step", json!(outcome.first_gap_over_ref)),
+        ("  at the later ones", json!(outcome.later_gap_over_ref)),
+        ("gap, mm", worst(outcome.worst_gap_mm, outcome.worst_gap_seed)),
+        ("lead time, s", least(outcome.lead_time_s)),
+        ("slip margin", least(outcome.slip_margin)),
+        ("off the commanded end, mm", json!(outcome.end_off_mm)),
+    ];
+    let found = outcome.steps_found.iter();
+    let found = found.map(|s| (format!("step {} found off by, mm", s.index), json!(s.off_mm)));
+    let rows = rows.into_iter().map(|(name, row)| (name.to_owned(), row)).chain(found);
+    Frame::of(
+        &FIGURES,
+        rows.map(|(name, mut row)| {
+            row["figure"] = name.into();
+            row
+        }),
     )
 }

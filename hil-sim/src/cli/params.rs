@@ -115,8 +115,7 @@ fn on_probe(_: &Args) -> Result<Outcome, Failure> {
 
 #[cfg(feature = "probe")]
 fn on_probe(args: &Args) -> Result<Outcome, Failure> {
-    let mut port = super::probe::attach(None)?;
-    act(args, &mut crate::params::Client::new(&mut port as &mut dyn crate::probe::Port))
+    act(args, &mut crate::params::Client::new(super::probe::attach(None)?))
 }
 
 /// Carries out the action on the parameters of this place.

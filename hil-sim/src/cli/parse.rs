@@ -27,7 +27,7 @@ pub(super) fn seconds(text: &str) -> Result<f64, &'static str> {
 }
 
 /// The error as one line, without usage and without the pointer to the help.
-fn line(text: &str) -> String {
+pub(super) fn line(text: &str) -> String {
     let said = text.split("\n\n").filter(|paragraph| {
         !paragraph.starts_with("Usage:") && !paragraph.starts_with("For more information")
     });

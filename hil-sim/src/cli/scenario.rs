@@ -79,18 +79,6 @@ pub(super) fn seed(text: &str) -> Result<u64, &'static str> {
     text.parse().map_err(|_| "expected a whole number, 0 or more")
 }
 
-/// Refuses a campaign whose seeds, the `count` that follow the scenario's, are no keys any more.
-pub(super) fn seeds_fit(scenario: &Scenario, count: u64) -> Result<(), Failure> {
-    const LAST: u64 = i64::MAX as u64;
-    let seed = scenario.run.seed;
-    match seed.checked_add(count) {
-        Some(..=LAST) => Ok(()),
-        _ => Err(Failure::input(format!(
-            "run.seed = {seed}: the {count} seeds that follow it go beyond the last, {LAST}"
-        ))),
-    }
-}
-
 impl RunArgs {
     /// Refuses a strategy where `what` needs none.
     pub(super) fn no_controller(&self, what: &str) -> Result<(), Failure> {

@@ -1,13 +1,13 @@
 //! `rig stress`: the plant at the ends of its ranges.
 
 use serde::Serialize;
+use serde_json::json;
 
+use super::campaign::CampaignArgs;
 use super::failure::{Failure, Outcome};
-use super::output;
 use super::scenario::seed;
-use crate::progress;
-use crate::stress::{self, StressReport};
-use crate::table::plain;
+use crate::campaign::{Column, Frame, column};
+use crate::stress::{self, StressReport, Worst};
 
 /// The plant at the ends of every range.
 ///
@@ -27,9 +27,8 @@ pub(super) struct Args {
           value_parser = seed)]
     seed: u64,
 
-    /// Prints the result as one JSON object.
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    pub(super) campaign: CampaignArgs,
 }
 
 /// What `--json` prints.
@@ -42,42 +41,35 @@ struct Printed<'a> {
 }
 
 pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
-    let report = {
-        let bar = progress::bar("cases of the plant", args.cases);
-        stress::run(args.cases as usize, args.seed, &|| bar.advance(1))
+    let campaign = stress::campaign(args.cases as usize, args.seed);
+    let found = args.campaign.carry_out(format!("seed {}", args.seed), campaign)?;
+    let report = &found.outcome;
+    let row = |worst: &Worst| {
+        let mut row = json!(worst.case);
+        row["figure"] = json!(worst.figure);
+        row["value"] = worst.value.into();
+        row
     };
-    let printed = Printed { report: &report, failures: report.failed.len() };
-    output::result(args.json, &printed, || human(&report))?;
-    Ok(Outcome::of(report.failed.is_empty()))
+    let rows = Frame::of(&COLUMNS, report.worst.iter().map(row));
+    let printed = Printed { report, failures: report.failed.len() };
+    found.print(&args.campaign, &printed, &rows, || human(report, &rows), report.failed.is_empty())
 }
 
-fn human(report: &StressReport) -> String {
-    const HEAD: [&str; 9] = [
-        "figure",
-        "of limit",
-        "case",
-        "Pa/m",
-        "tau, dt\ns",
-        "speed\nmm/s",
-        "step\nmm",
-        "mu",
-        "masses",
-    ];
-    let rows = report.worst.iter().map(|worst| {
-        let case = &worst.case;
-        vec![
-            format!("{:?}", worst.figure),
-            format!("{:.3}", worst.value),
-            case.index.to_string(),
-            format!("{:.1e} x {:.0}", case.k_inf_pa_per_m, case.stiffening),
-            format!("{:.0e}, {:.0e}", case.tau_s, case.dt_s),
-            format!("{:.0}", case.speed_mm_s),
-            format!("{:.1}", case.step_mm),
-            format!("{:.1}", case.mu),
-            format!("{:.0e}", case.mass_ratio),
-        ]
-    });
-    let mut text = format!("{} cases of the plant\n{}\n", report.cases, plain(&HEAD, rows));
+/// Columns of the worst cases.
+const COLUMNS: [Column; 9] = [
+    column("figure", "figure", "", 0),
+    column("value", "of limit", "", 3),
+    column("index", "case", "", 0),
+    column("k_inf_pa_per_m", "stiffness", "Pa/m", 0),
+    column("stiffening", "stiffening", "", 1),
+    column("tau_s", "tau", "s", 6),
+    column("speed_mm_s", "speed", "mm/s", 0),
+    column("step_mm", "step", "mm", 1),
+    column("mu", "mu", "", 1),
+];
+
+fn human(report: &StressReport, rows: &Frame) -> String {
+    let mut text = format!("{} cases of the plant\n{}", report.cases, rows.text());
     for (name, refused) in &report.refused {
         text += &format!("  refused {}: {name}, as: {}\n", refused.count, refused.example);
     }

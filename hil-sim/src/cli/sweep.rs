@@ -3,19 +3,18 @@
 use std::path::{Path, PathBuf};
 
 use interstage::units;
-use rayon::prelude::*;
 use serde_json::{Map, Value, json};
 
+use super::campaign::CampaignArgs;
 use super::crossing::{CrossingSetup, Method};
 use super::failure::{Failure, Outcome};
 use super::output;
 use super::scenario::RunArgs;
+use crate::campaign::{Campaign, Column, Frame, column};
 use crate::files::{make_directory, vacant_for, write_text};
-use crate::progress::{self, Progress};
-use crate::scenario::{Direction, Scenario, brief};
+use crate::scenario::{Direction, Scenario};
 use crate::session::{self, Options};
 use crate::sweep::{self, Axis, MOST, Plot};
-use crate::table::{number, plain};
 
 /// Names of the pseudo-keys of an isolated crossing.
 const SPEED: &str = "speed_mm_s";
@@ -58,16 +57,15 @@ pub(super) struct Args {
     #[arg(long, conflicts_with = "out")]
     no_files: bool,
 
-    /// Prints the rows as one JSON object.
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    pub(super) campaign: CampaignArgs,
 }
 
 type Row = Map<String, Value>;
 
-/// What is found at each place: columns with their headings and decimals, and what is plotted.
+/// What is found at each place, and what of it is plotted.
 struct Measure {
-    columns: &'static [(&'static str, &'static str, usize)],
+    columns: &'static [Column],
     plots: Vec<Plot>,
 }
 
@@ -84,18 +82,29 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
         .map(|place| Point::of(args, &base, &axes, place))
         .collect::<Result<_, _>>()?;
     let measure = if args.crossing { of_crossing(args.driven) } else { of_run() };
-    let rows = {
-        let bar =
-            progress::bar(if args.crossing { "crossings" } else { "runs" }, points.len() as u64);
-        let one = |(point, place): (&Point, &Vec<&str>)| {
-            Ok(sweep::row(&axes, place, point.found(args.method, &bar)?))
-        };
-        points.par_iter().zip(&places).map(one).collect::<Result<Vec<Row>, Failure>>()?
+    let campaign = Campaign {
+        steps: (if args.crossing { "crossings" } else { "runs" }, 1),
+        cases: points.iter().zip(&places).collect(),
+        run: Box::new(|(point, place): &(&Point, &Vec<&str>), done| {
+            let row = sweep::row(&axes, place, point.found(args.method)?);
+            done();
+            Ok::<Row, Failure>(row)
+        }),
+        fold: Box::new(|lines| lines.into_iter().map(|(_, row)| row).collect::<Vec<Row>>()),
     };
-    let files = if args.no_files { Vec::new() } else { write(args, &axes, &rows, &measure)? };
+    let found = args.campaign.carry_out(base.to_toml(), campaign)?;
+    let keys = axes.iter().map(|Axis { key, .. }| Column {
+        key: key.clone().into(),
+        name: key.clone().into(),
+        ..column("", "", "", 6)
+    });
+    let columns: Vec<Column> = keys.chain(measure.columns.iter().cloned()).collect();
+    let (rows, table) = (&found.outcome, Frame::of(&columns, &found.outcome));
+    let write = || write(args, &axes, rows, &table.csv(), &measure);
+    let files = if args.no_files { Vec::new() } else { write()? };
     let printed = json!({ "rows": rows, "files": files });
-    output::result(args.json, &printed, || human(&axes, &rows, &measure) + &output::wrote(&files))?;
-    Ok(Outcome::Good)
+    let text = || table.text() + &output::wrote(&files);
+    found.print(&args.campaign, &printed, &table, text, true)
 }
 
 /// The keys that were given, or the usual ones of a crossing.
@@ -165,7 +174,7 @@ impl Point {
     }
 
     /// What is found here.
-    fn found(&self, method: Method, bar: &Progress) -> Result<Row, Failure> {
+    fn found(&self, method: Method) -> Result<Row, Failure> {
         let found = match &self.crossing {
             Some(setup) => {
                 let (figures, outside) = setup.compute(method, &self.scenario)?;
@@ -186,40 +195,38 @@ impl Point {
                 })
             }
         };
-        bar.advance(1);
         Ok(found.as_object().cloned().unwrap_or_default())
     }
 }
 
 fn of_run() -> Measure {
-    let plot = |column, title, y_name, level| Plot { column, title, y_name, level };
-    Measure {
-        columns: &[
-            ("completed", "completed", 0),
-            ("max_gap_mm", "worst gap\nmm", 3),
-            ("gap_over_ref", "over\nreference", 4),
-            ("duration_s", "duration\ns", 2),
-            ("slip_mm", "slip\nmm", 3),
-            ("faults", "faults", 0),
-        ],
-        plots: vec![
-            plot("max_gap_mm", "Worst gap", "gap, mm", None),
-            plot("duration_s", "Duration from the command", "duration, s", None),
-            plot("slip_mm", "Gross slip", "slip, mm", None),
-        ],
-    }
+    const COLUMNS: &[Column] = &[
+        column("completed", "completed", "", 0),
+        column("max_gap_mm", "worst gap", "mm", 3),
+        column("gap_over_ref", "over\nreference", "", 4),
+        column("duration_s", "duration", "s", 2),
+        column("slip_mm", "slip", "mm", 3),
+        column("faults", "faults", "", 0),
+    ];
+    let plot = |column, title, y_name| Plot { column, title, y_name };
+    let plots = vec![
+        plot("max_gap_mm", "Worst gap", "gap, mm"),
+        plot("duration_s", "Duration from the command", "duration, s"),
+        plot("slip_mm", "Gross slip", "slip, mm"),
+    ];
+    Measure { columns: COLUMNS, plots }
 }
 
 fn of_crossing(is_driven: bool) -> Measure {
-    let columns: &[_] = &[
-        ("gap_mm", "gap\nmm", 3),
-        ("corner_force_n", "corner\nN", 2),
-        ("embedding_mm", "embedding\nmm", 3),
-        ("climb_work_mj", "work\nmJ", 1),
-        ("in_range", "in range", 0),
-        ("mu_needed", "friction\nneeded", 3),
+    const COLUMNS: &[Column] = &[
+        column("gap_mm", "gap", "mm", 3),
+        column("corner_force_n", "corner", "N", 2),
+        column("embedding_mm", "embedding", "mm", 3),
+        column("climb_work_mj", "work", "mJ", 1),
+        column("in_range", "in range", "", 0),
+        column("mu_needed", "friction\nneeded", "", 3),
     ];
-    let plot = |column, title, y_name| Plot { column, title, y_name, level: None };
+    let plot = |column, title, y_name| Plot { column, title, y_name };
     let mut plots = vec![
         plot("gap_mm", "Gap of the crossing", "gap, mm"),
         plot("corner_force_n", "Corner force", "force, N"),
@@ -227,60 +234,33 @@ fn of_crossing(is_driven: bool) -> Measure {
     if is_driven {
         plots.push(plot("mu_needed", "Friction needed", "friction"));
     }
-    Measure { columns: if is_driven { columns } else { &columns[..5] }, plots }
+    Measure { columns: if is_driven { COLUMNS } else { &COLUMNS[..5] }, plots }
 }
 
 fn write(
     args: &Args,
     axes: &[Axis],
     rows: &[Row],
+    table: &str,
     measure: &Measure,
 ) -> Result<Vec<PathBuf>, Failure> {
     let keys: Vec<&str> = axes.iter().map(|axis| &*axis.key).collect();
     let what = if args.crossing { "crossing" } else { "deploy" };
     let usual = || Path::new("out").join(format!("sweep-{what}-{}", keys.join("-")));
     let directory = args.out.clone().unwrap_or_else(usual);
-    let columns: Vec<String> = keys
-        .iter()
-        .copied()
-        .chain(measure.columns.iter().map(|column| column.0))
-        .map(str::to_owned)
-        .collect();
-    let table = sweep::csv(&columns, rows).map_err(Failure::run)?;
     let directory = if args.out.is_some() {
         directory
     } else {
         // Another sweep of these keys keeps its folder.
         let file = |folder: &Path| folder.join("sweep.csv");
-        crate::files::vacant(&directory, |folder| vacant_for(&file(folder), &table) == file(folder))
+        crate::files::vacant(&directory, |folder| vacant_for(&file(folder), table) == file(folder))
     };
     make_directory(&directory)?;
     let mut files = vec![directory.join("sweep.csv")];
-    write_text(&files[0], &table)?;
+    write_text(&files[0], table)?;
     if let Some(picture) = sweep::picture(axes, rows, &measure.plots) {
         files.push(directory.join("sweep.svg"));
         write_text(&files[1], &picture)?;
     }
     Ok(files)
-}
-
-fn human(axes: &[Axis], rows: &[Row], measure: &Measure) -> String {
-    let head: Vec<&str> = axes
-        .iter()
-        .map(|axis| &*axis.key)
-        .chain(measure.columns.iter().map(|column| column.1))
-        .collect();
-    let cell = |row: &Row, name: &str, decimals: usize| match row.get(name) {
-        None | Some(Value::Null) => "-".to_owned(),
-        Some(Value::Bool(yes)) => if *yes { "yes" } else { "no" }.to_owned(),
-        Some(Value::Number(value)) => number(value.as_f64(), decimals),
-        Some(Value::Array(list)) if list.is_empty() => "-".to_owned(),
-        Some(other) => brief(other),
-    };
-    let lines = rows.iter().map(|row| {
-        let keys = axes.iter().map(|axis| brief(&row[&axis.key]));
-        keys.chain(measure.columns.iter().map(|(name, _, decimals)| cell(row, name, *decimals)))
-            .collect()
-    });
-    format!("{}\n", plain(&head, lines))
 }

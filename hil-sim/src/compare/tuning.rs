@@ -8,7 +8,7 @@ const LADDER: [f64; 5] = [0.0, 0.03, 0.06, 0.12, 0.25];
 /// How close to the reference the worst gap is tuned, relative.
 const TUNED_WITHIN: f64 = 0.002;
 /// Most evaluations of one tuning.
-pub const MOST_TRIES: usize = 11;
+pub(super) const MOST_TRIES: usize = 11;
 
 /// The entry, and what belongs to it, with the least reserve at which the worst gap is the
 /// reference. Where the gap first falls below it on the ladder, the Illinois variant of regula

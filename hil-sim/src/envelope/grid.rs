@@ -3,8 +3,6 @@
 use std::fmt;
 use std::str::FromStr;
 
-use crate::compare::STRATEGIES;
-
 /// Least and largest friction of tread on wall.
 const FRICTION: (f64, f64) = (0.6, 1.3);
 /// Least and largest load on the wheel, N.
@@ -36,11 +34,6 @@ impl Grid {
     /// The loads on the wheel, ascending, N.
     pub(crate) fn loads_n(self) -> Vec<f64> {
         spread(LOAD_N, self.loads)
-    }
-
-    /// Runs that it takes: each place known and unknown with every strategy.
-    pub const fn runs(self) -> usize {
-        2 * self.frictions * self.loads * STRATEGIES.len()
     }
 }
 
@@ -80,7 +73,6 @@ mod tests {
         assert_eq!(Grid::USUAL.to_string(), "8x7");
         assert_eq!(Grid::USUAL.frictions(), [0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2, 1.3]);
         assert_eq!(Grid::USUAL.loads_n(), [0.0, 5.0, 10.0, 15.0, 20.0, 25.0, 30.0]);
-        assert_eq!(Grid::USUAL.runs(), 448);
         for text in ["8", "1x7", "8x101", "x", "8x7x2", "-2x3", ""] {
             assert_eq!(text.parse::<Grid>(), Err(GridError), "{text}");
         }

@@ -9,6 +9,7 @@ use crate::report::axis::{Scale, label};
 use crate::report::mesh;
 use crate::report::palette;
 use crate::report::svg::{self, Area, Drawn, SCALE, font};
+use crate::scenario::ControllerKind;
 
 const S: i32 = SCALE as i32;
 /// Size, CSS pixels: its text can still be read at a width of 400.
@@ -27,7 +28,7 @@ pub fn picture(envelope: &Envelope) -> String {
         legend(&head)?;
         let places = STRATEGIES.into_iter().flat_map(|kind| [true, false].map(|k| (k, kind)));
         for (area, (known, kind)) in maps.split_evenly((STRATEGIES.len(), 2)).iter().zip(places) {
-            map(envelope, area, known, kind.name())?;
+            map(envelope, area, known, kind)?;
         }
         Ok(())
     })
@@ -55,11 +56,11 @@ fn half(values: &[f64]) -> f64 {
 }
 
 /// The map of one strategy.
-fn map(envelope: &Envelope, area: &Area, known: bool, controller: &'static str) -> Drawn {
+fn map(envelope: &Envelope, area: &Area, known: bool, controller: ControllerKind) -> Drawn {
     let (head, body) = area.split_vertically(HEAD);
     let part = envelope.area(controller);
     let (what, part) = if known { ("known", part.known) } else { ("unknown", part.unknown) };
-    let title = format!("{controller}, {what}: {:.0} %", 100.0 * part);
+    let title = format!("{}, {what}: {:.0} %", controller.name(), 100.0 * part);
     let style = font(13.0, palette::TRUTH, HPos::Left, VPos::Center);
     head.draw(&Text::new(title, (46 * S, HEAD / 2), style))?;
     let (frictions, loads) = (&envelope.frictions, &envelope.loads_n);

@@ -5,28 +5,37 @@ mod matrix;
 pub mod operator;
 pub mod twin;
 
+use std::borrow::Cow;
+
+use interstage::rig::Rig;
 use interstage::supervise::{Leg, Mode};
 use rayon::prelude::*;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::judge::{Finding, Judge};
+use crate::campaign::Campaign;
 use crate::plant::rig::VirtualRig;
 use crate::scenario::Scenario;
 use crate::scenario::injection::{Injection, Kind, Target};
-use crate::session::{Options, RunError, Session};
+use crate::session::{self, Options, RunError, Session};
 
 pub use case::Case;
 pub use matrix::{MatrixRow, MedianAndWorst, Outcome};
 use operator::Operator;
 use twin::Twin;
 
-/// Longest run, s.
-pub const LONGEST_S: f64 = 60.0;
 /// How long a run is watched after its end, s.
 pub const AFTER_S: f64 = 1.0;
 
+/// Longest run out and back, s: half of what one direction alone may take at the least useful
+/// speed, and three times the travel at cruise speed.
+pub fn longest_s(rig: &Rig) -> f64 {
+    let cruise_s = rig.rig.travel_mm / rig.drive.cruise_speed_mm_s;
+    (0.5 * session::longest_s(rig)).max(3.0 * cruise_s)
+}
+
 /// What became of one fault at one instant.
-#[derive(Clone, Debug, Default, Serialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Instant {
     /// Seed of the rig.
     pub seed: u64,
@@ -35,21 +44,21 @@ pub struct Instant {
     /// Measure of the fault, in the unit of the catalogue.
     pub magnitude: Option<f64>,
     /// What the drive was doing.
-    pub during: &'static str,
+    pub during: Cow<'static, str>,
     /// What became of it.
     pub finding: Finding,
     /// Code of the fault, or of the limit.
     pub code: Option<u16>,
     /// What restarted the controller, if something did and it was reported.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub restart: Option<&'static str>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub restart: Option<Cow<'static, str>>,
     /// From the first effect of the fault to its report, ms. Of a fault of a bridge: from when
     /// the duty was off by more than the readback's band.
     pub latency_ms: Option<f64>,
     /// From the report to rest with both bridges off, ms.
     pub rest_ms: Option<f64>,
     /// How the run ended.
-    pub end: &'static str,
+    pub end: Cow<'static, str>,
     /// Largest preload, N.
     pub peak_preload_n: f64,
     /// Distance moved uncommanded, mm.
@@ -60,9 +69,29 @@ pub struct Instant {
     pub harms: Vec<String>,
 }
 
-/// A campaign.
+impl Instant {
+    /// What the judge has seen of a run of this scenario whose largest gap was `gap_part` of the
+    /// reference.
+    pub fn judged(scenario: &Scenario, judge: &Judge, twin: &Twin, gap_part: f64) -> Self {
+        Self {
+            seed: scenario.run.seed,
+            magnitude: scenario.run.faults.first().map(Injection::magnitude),
+            during: "at rest".into(),
+            code: judge.report(&twin.limits).map(|(_, code)| code),
+            rest_ms: judge.fault.and_then(|(at_s, _)| Some(1e3 * (judge.rest_s? - at_s).max(0.0))),
+            end: judge.end().into(),
+            peak_preload_n: judge.peak_preload_n,
+            motion_mm: judge.motion_mm,
+            gap_part,
+            harms: judge.harms(),
+            ..Self::default()
+        }
+    }
+}
+
+/// Which faults on which rigs.
 #[derive(Clone, Debug)]
-pub struct Campaign {
+pub struct FaultCampaign {
     /// Rig, strategy, first seed.
     pub scenario: Scenario,
     /// Instants a fault.
@@ -71,34 +100,29 @@ pub struct Campaign {
     pub cases: Vec<Case>,
 }
 
-impl Campaign {
-    /// Number of its runs.
-    #[must_use]
-    pub fn runs(&self) -> u64 {
-        (self.instants * (self.cases.len() + 1)) as u64
-    }
+/// Each rig and its run without a fault.
+pub type Rigs = Vec<(Scenario, Twin)>;
 
+impl FaultCampaign {
     /// Runs it in software on all processors and calls `done` after each run. The outcome does
     /// not depend on the number of processors.
     ///
     /// # Errors
     /// [`RunError`] if a run without a fault cannot be made.
     pub fn run(&self, done: &(dyn Fn() + Sync)) -> Result<Outcome, RunError> {
-        self.run_on("sil", Twin::run, watched, done)
+        let rigs = self.rigs(Twin::run, done)?;
+        self.on("sil", &rigs, watched).complete(done)
     }
 
-    /// Runs it on a target: each rig without a fault first, then every fault on each. A run
-    /// that cannot be made counts as undetected.
+    /// Runs each rig without a fault.
     ///
     /// # Errors
     /// Those of `twin`.
-    pub fn run_on<E: std::fmt::Display + Send>(
+    pub fn rigs<E: Send>(
         &self,
-        target: &'static str,
         twin: impl Fn(&Scenario) -> Result<Twin, E> + Sync,
-        watched: impl Fn(&Scenario, &Twin) -> Result<Instant, E> + Sync,
         done: &(dyn Fn() + Sync),
-    ) -> Result<Outcome, E> {
+    ) -> Result<Rigs, E> {
         let rig = |instant: usize| {
             let mut scenario = self.scenario.clone();
             scenario.run.seed += 1 + instant as u64;
@@ -106,29 +130,43 @@ impl Campaign {
             done();
             Ok((scenario, twin))
         };
-        let rigs = (0..self.instants).into_par_iter().map(rig).collect::<Result<Vec<_>, E>>()?;
-        let row = |case: &Case| {
+        (0..self.instants).into_par_iter().map(rig).collect()
+    }
+
+    /// The campaign of every fault on each of these rigs on a target. A run that cannot be made
+    /// counts as undetected.
+    pub fn on<'a, E: std::fmt::Display>(
+        &'a self,
+        target: &'static str,
+        rigs: &'a Rigs,
+        watched: impl Fn(&Scenario, &Twin) -> Result<Instant, E> + Sync + 'a,
+    ) -> Campaign<'a, Case, MatrixRow, Outcome, E> {
+        let row = move |case: &Case, done: &(dyn Fn() + Sync)| {
             let one = |(instant, (rig, twin)): (usize, &(Scenario, Twin))| {
                 let scenario = case.scenario(rig, twin, instant);
                 let found = watched(&scenario, twin);
                 done();
                 found.unwrap_or_else(|error| Instant {
                     seed: scenario.run.seed,
-                    during: "at rest",
-                    end: "plant failed",
+                    during: "at rest".into(),
+                    end: "plant failed".into(),
                     harms: vec![error.to_string()],
                     ..Instant::default()
                 })
             };
             let instants: Vec<Instant> = rigs.par_iter().enumerate().map(one).collect();
-            MatrixRow::of(case, &instants)
+            Ok(MatrixRow::of(case, &instants))
         };
-        Ok(Outcome::of(target, self.cases.iter().map(row).collect(), self.instants))
+        let fold = move |lines: Vec<(Case, MatrixRow)>| {
+            let rows = lines.into_iter().map(|(_, row)| row).collect();
+            Outcome::of(target, rows, self.instants)
+        };
+        let steps = ("runs", self.instants);
+        Campaign { steps, cases: self.cases.clone(), run: Box::new(row), fold: Box::new(fold) }
     }
 }
 
 /// A name for what the drive is doing.
-#[must_use]
 pub fn doing(mode: Mode) -> &'static str {
     match mode {
         Mode::Preload(_) => "preload",
@@ -143,7 +181,6 @@ pub fn doing(mode: Mode) -> &'static str {
 
 /// Largest gap over the reference gap, of crossings and elsewhere (`worst_mm`), and whether
 /// every step was crossed in both directions.
-#[must_use]
 pub fn crossed(plant: &VirtualRig, twin: &Twin, worst_mm: f64) -> (f64, bool) {
     let crossings = plant.ledger().crossings();
     let steps = plant.parameters().wall.steps().len();
@@ -152,15 +189,19 @@ pub fn crossed(plant: &VirtualRig, twin: &Twin, worst_mm: f64) -> (f64, bool) {
     (parts.fold(worst_mm / out, f64::max), crossings.len() == 2 * steps)
 }
 
-/// Runs a scenario with its fault beside its twin.
-fn watched(scenario: &Scenario, twin: &Twin) -> Result<Instant, RunError> {
+/// Runs a scenario in software with its fault, beside its twin.
+///
+/// # Errors
+/// [`RunError`] if it cannot be made.
+pub fn watched(scenario: &Scenario, twin: &Twin) -> Result<Instant, RunError> {
     let mut session = Session::new(scenario, Options::default())?;
     let mut judge = Judge::new(scenario, session.plant().truth());
     let mut operator = Operator::default();
     let injection = scenario.run.faults.first();
     let reset = injection.filter(|fault| fault.target == Target::Reset).map(|fault| fault.kind);
     let (mut during, mut after_s, mut worst_mm) = ("at rest", 0.0, 0.0f64);
-    while session.time_s() < LONGEST_S && after_s < AFTER_S {
+    let longest_s = longest_s(&scenario.rig);
+    while session.time_s() < longest_s && after_s < AFTER_S {
         let t_s = session.time_s();
         let before = session.mode();
         let command = operator.command(before);
@@ -188,23 +229,31 @@ fn watched(scenario: &Scenario, twin: &Twin) -> Result<Instant, RunError> {
         Some(1e3 * (to_s - from_s).max(0.0))
     };
     Ok(Instant {
-        seed: scenario.run.seed,
         at_s,
-        magnitude: injection.map(Injection::magnitude),
-        during,
+        during: during.into(),
         finding,
-        code: report.map(|(_, code)| code),
         restart: reset.map(|kind| match kind {
-            Kind::Recorded => "reset by pin",
-            _ => "reset by supply",
+            Kind::Recorded => "reset by pin".into(),
+            _ => "reset by supply".into(),
         }),
         // A report before the first effect has no latency.
         latency_ms: since(session.tells_s()).or(since(session.acts_s()).map(|_| 0.0)),
-        rest_ms: judge.fault.and_then(|(at_s, _)| Some(1e3 * (judge.rest_s? - at_s).max(0.0))),
-        end: judge.end(),
-        peak_preload_n: judge.peak_preload_n,
-        motion_mm: judge.motion_mm,
-        gap_part,
-        harms: judge.harms(),
+        ..Instant::judged(scenario, &judge, twin, gap_part)
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn there_is_time_for_both_directions_at_any_cruise_speed() {
+        let mut rig = Rig::prototype();
+        assert_eq!(longest_s(&rig), 60.0);
+        for (travel_mm, cruise_mm_s) in [(1000.0, 5.0), (160.0, 2.0), (80.0, 0.5)] {
+            (rig.rig.travel_mm, rig.drive.cruise_speed_mm_s) = (travel_mm, cruise_mm_s);
+            let both_s = 2.0 * travel_mm / cruise_mm_s;
+            assert!(longest_s(&rig) > 1.2 * both_s && session::longest_s(&rig) > 0.7 * both_s);
+        }
+    }
 }

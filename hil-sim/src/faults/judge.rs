@@ -7,10 +7,11 @@ use interstage::supervise::Mode;
 use interstage::supervise::{OVERPRESSURE_TICKS, off_reference_mm};
 use interstage::tick::{Event, Output};
 use interstage::units::Direction;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::plant::draw::STOP_ROOM_MM;
 use crate::plant::rig::Truth;
+use crate::plant::wall::touch_mm;
 use crate::scenario::injection::{Kind, Target, entry};
 use crate::scenario::{Scenario, StepAnomaly};
 
@@ -33,7 +34,7 @@ const OPERATIONAL: [Limit; 5] = [
 const REST_MM_S: f64 = 0.01;
 
 /// What became of a fault.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Finding {
     /// A fault that names it was latched.
@@ -73,8 +74,7 @@ impl Bounds {
         let late_s = f64::from(OVERPRESSURE_TICKS) * TICK_S + rig.preload_latency_s();
         let mass_kg = drive.reflected_mass_kg + rig.plant.moved_mass_kg;
         let coasts_s = 1e-3 * mass_kg * drive.no_load_speed_mm_s / drive.stall_force_n;
-        let over = rig_mm.wheel_radius_mm - rig_mm.step_height_mm;
-        let run_mm = (rig_mm.wheel_radius_mm.powi(2) - over * over).sqrt();
+        let run_mm = touch_mm(rig_mm.wheel_radius_mm, rig_mm.step_height_mm);
         let stops_mm = off_reference_mm(rig) + drive.cruise_speed_mm_s * coasts_s;
         Self {
             preload_n: trips_n + preload.slew_n_per_s * late_s,
@@ -114,7 +114,6 @@ pub struct Judge {
 
 impl Judge {
     /// Before the first tick of a run.
-    #[must_use]
     pub fn new(scenario: &Scenario, truth: &Truth) -> Self {
         let fault = scenario.run.faults.first();
         let target = fault.map(|fault| fault.target);
@@ -193,7 +192,6 @@ impl Judge {
     }
 
     /// Which bounds of the mechanism were exceeded, in words; empty if it was safe.
-    #[must_use]
     pub fn harms(&self) -> Vec<String> {
         let mut harms = Vec::new();
         let most = self.bounds.preload_n;
@@ -216,7 +214,6 @@ impl Judge {
     /// What became of the fault. `known` are the limits of the same run without it,
     /// `gap_part` the largest gap over the reference, `crossed` whether every step was
     /// crossed; a stop on command is as good an end as arrival.
-    #[must_use]
     pub fn finding(&self, known: &[u16], gap_part: f64, crossed: bool) -> Finding {
         let ended = match self.mode {
             Mode::Complete(_) => crossed || self.commanded,
@@ -263,14 +260,12 @@ impl Judge {
 
     /// The report that counts, when, s, and its code: the fault or else the first limit, one that
     /// names what was injected before others.
-    #[must_use]
     pub fn report(&self, known: &[u16]) -> Option<(f64, u16)> {
         let all = || self.fault.into_iter().chain(self.new_limits(known));
         all().find(|(_, code)| self.names(*code)).or(all().next())
     }
 
     /// How the run ended, in a word.
-    #[must_use]
     pub fn end(&self) -> &'static str {
         match self.mode {
             Mode::FaultHold(_) => "fault hold",

@@ -51,20 +51,17 @@ pub fn places(scenario: &Scenario) -> Result<Vec<u8>, CompileError> {
 }
 
 /// Bits of a set of this many bytes, and of its seal and length where it is stored.
-#[must_use]
 pub const fn bits(length: usize, stored: bool) -> u32 {
     8 * length as u32 + if stored { PREFIX_BITS } else { 0 }
 }
 
 /// Bits of seal and length alone, which come first.
-#[must_use]
 pub const fn seal_bits() -> u32 {
     PREFIX_BITS
 }
 
 /// Operations of the flash in a save of this many bytes: it erases, writes the set, its length
 /// and its seal.
-#[must_use]
 pub const fn operations(length: usize) -> u32 {
     (SLOT_BYTES / PAGE_BYTES + length.div_ceil(WORD_BYTES) + 2) as u32
 }

@@ -69,17 +69,18 @@ impl<'a> HostLine<'a> {
     ) -> Result<Option<ToHost>, HilError> {
         // Every message fits.
         let Some(bytes) = frame(message) else { return Ok(None) };
-        let (mut waited, mut sent) = (Duration::ZERO, Duration::ZERO);
+        let since = self.port.now();
+        let mut sent = since;
         let mut left = bytes.as_slice();
-        while waited < TIMEOUT {
-            if left.is_empty() && waited >= sent + RETRY {
+        while self.port.now().saturating_sub(since) < TIMEOUT {
+            if left.is_empty() && self.port.now() >= sent + RETRY {
                 left = bytes.as_slice();
             }
             if !left.is_empty() {
                 left = &left[self.port.down(DOWN, left)?..];
-                sent = waited;
+                sent = self.port.now();
             }
-            waited += self.port.pass()?;
+            self.port.pass()?;
             for byte in self.port.up(UP)? {
                 if let Some(answer) = self.gatherer.take(byte)
                     && answers(&answer)
@@ -89,5 +90,19 @@ impl<'a> HostLine<'a> {
             }
         }
         Ok(None)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::probe::Mute;
+
+    #[test]
+    fn a_slow_probe_does_not_stretch_the_timeout() {
+        let mut port = Mute::new();
+        let state = HostLine::begin_at(&mut port).state();
+        assert!(matches!(state, Err(HilError::NoAnswer)));
+        assert!(port.now() < TIMEOUT + Duration::from_millis(20), "{:?}", port.now());
     }
 }

@@ -18,6 +18,7 @@ use super::record::{Record, TICK_S};
 use super::traces::{Bin, Effort, Traces, at};
 use crate::plant::draw::PlantParameters;
 use crate::plant::rig::{PlantError, VirtualRig};
+use crate::plant::wall::touch_mm;
 
 /// Step of the forward model, ticks.
 const STEP: usize = 2;
@@ -204,9 +205,10 @@ const MOVED: [(usize, f64); 7] = [
 /// By how much the steps are moved, mm, in position and height.
 const MOVED_STEPS_MM: f64 = 0.03;
 
-/// How far before its face a corner acts, mm, and the part of the rest between two steps
-/// that belongs to the first, whose edge the patch has to leave.
-const CORNER_MM: f64 = 14.5;
+/// How far before its face a corner acts, parts of the distance at which an undeformed wheel
+/// touches it, and the part of the rest between two steps that belongs to the first, whose edge
+/// the patch has to leave.
+const CORNER: f64 = 1.07;
 const PART_OF_CLEAR: f64 = 0.8;
 
 /// Trajectories of all runs at these coordinates.
@@ -288,7 +290,8 @@ fn step_columns(
     // Whether a wheel has left a step behind: past its face by most of what is left to the
     // corner of the next.
     let is_behind = |k: usize, step: usize| {
-        let clear = |next: &f64| PART_OF_CLEAR * (next - faces[step] - CORNER_MM).max(0.0);
+        let corner = |step| CORNER * touch_mm(x[RADIUS], x[coordinates.height(step)]);
+        let clear = |next: &f64| PART_OF_CLEAR * (next - faces[step] - corner(step + 1)).max(0.0);
         let past = |next: &f64| base.series[POSITION][k] > faces[step] + clear(next);
         faces.get(step + 1).is_some_and(past)
     };

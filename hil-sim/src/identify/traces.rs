@@ -11,6 +11,7 @@ use std::ops::Range;
 
 use super::IdentifyError;
 use super::record::{Record, Sample, TICK_S};
+use crate::plant::wall::touch_mm;
 
 /// Length of a bin, ticks.
 pub(crate) const BIN: usize = 10;
@@ -27,10 +28,9 @@ const LEAST_UNLOADED: usize = 50;
 const LEAST_PRELOAD_N: f64 = 2.0;
 /// Relative distance from a mode's speed within which nothing is compared.
 const NEAR_MODE: f64 = 0.12;
-/// Rotation at a step with the arm at rest that is slip, mm of tread.
-const SLIPS_MM: f64 = 4.0;
-/// How far before a face the wheel is clear of its corner, mm.
-const BEFORE_SLIP_MM: f64 = 16.0;
+/// How far before a face the wheel is clear of its corner, parts of the distance at which it
+/// touches.
+const CLEAR: f64 = 1.18;
 /// Change of the arm's mean over so many ticks below which it is at rest, rad: a tenth of
 /// a millimetre, as a slipping wheel bounces.
 const AT_REST_RAD: f64 = 1e-3;
@@ -169,9 +169,12 @@ impl Traces {
             steady -= STEADY;
         }
         let steady = steady + STEADY;
+        let clear_mm = CLEAR * touch_mm(rig.wheel_radius_mm, rig.step_height_mm);
+        // Without getting up it has rolled no farther than the step is high.
         let rolled = |tick: usize| self.turn_rad[tick] * rig.wheel_radius_mm;
-        let onset = (self.span.start..end).find(|&tick| rolled(tick) > face - BEFORE_SLIP_MM)?;
-        let slips = steady > onset && rolled(end - 1) - rolled(steady.min(end - 1)) > SLIPS_MM;
+        let onset = (self.span.start..end).find(|&tick| rolled(tick) > face - clear_mm)?;
+        let slips =
+            steady > onset && rolled(end - 1) - rolled(steady.min(end - 1)) > rig.step_height_mm;
         slips.then_some(onset)
     }
 

@@ -16,7 +16,8 @@ use std::time::Duration;
 
 use serde_json::{Value, json};
 use tungstenite::handshake::server::{ErrorResponse, Request, Response};
-use tungstenite::http::{HeaderValue, StatusCode, header::SEC_WEBSOCKET_PROTOCOL};
+use tungstenite::http::header::{ORIGIN, SEC_WEBSOCKET_PROTOCOL};
+use tungstenite::http::{HeaderValue, StatusCode};
 use tungstenite::{Message, WebSocket};
 
 use crate::record::Topic;
@@ -27,6 +28,18 @@ const PROTOCOLS: [&str; 2] = ["foxglove.websocket.v1", "foxglove.sdk.v1"];
 const WAITING: usize = 4096;
 /// Longest wait for a client's request between two messages to it.
 const LISTEN: Duration = Duration::from_millis(5);
+/// Longest wait for a client to send its handshake, or to take a message.
+const PATIENCE: Duration = Duration::from_secs(5);
+/// Most connections at a time.
+const MOST: usize = 16;
+/// Pause after a connection that could not be accepted.
+const AFTER_ERROR: Duration = Duration::from_millis(100);
+/// Web viewers that may read the log, beside pages of this machine.
+const VIEWERS: [&str; 3] = [
+    "https://app.foxglove.dev",
+    "https://studio.foxglove.dev",
+    "https://lichtblick-suite.github.io",
+];
 /// First byte of a message of data.
 const DATA: u8 = 1;
 
@@ -40,23 +53,20 @@ struct Published {
 /// A server that publishes to every client.
 pub struct Server {
     address: SocketAddr,
-    clients: Arc<Mutex<Vec<SyncSender<Arc<Published>>>>>,
+    clients: Clients,
 }
+
+/// The clients that have shaken hands.
+type Clients = Arc<Mutex<Vec<SyncSender<Arc<Published>>>>>;
 
 impl Server {
     /// Listens at `address`.
     pub fn bind(address: &str) -> io::Result<Self> {
         let listener = TcpListener::bind(address)?;
         let address = listener.local_addr()?;
-        let clients = Arc::new(Mutex::new(Vec::new()));
+        let clients = Clients::default();
         let shared = Arc::clone(&clients);
-        thread::spawn(move || {
-            for stream in listener.incoming().map_while(Result::ok) {
-                let (sender, receiver) = sync_channel(WAITING);
-                lock(&shared).push(sender);
-                thread::spawn(move || serve(stream, &receiver));
-            }
-        });
+        thread::spawn(move || accept(listener.incoming(), &shared));
         Ok(Self { address, clients })
     }
 
@@ -84,16 +94,61 @@ fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
+/// Serves every connection in its own thread, [`MOST`] at a time; one that fails ends no other.
+fn accept(incoming: impl Iterator<Item = io::Result<TcpStream>>, clients: &Clients) {
+    let open = Arc::new(());
+    for stream in incoming {
+        match stream {
+            Ok(stream) if Arc::strong_count(&open) <= MOST => {
+                let (open, clients) = (Arc::clone(&open), Arc::clone(clients));
+                thread::spawn(move || {
+                    // A client that disconnects ends in an error.
+                    let _ = serve(stream, &clients);
+                    drop(open);
+                });
+            }
+            Ok(_) => {}
+            Err(_) => thread::sleep(AFTER_ERROR),
+        }
+    }
+}
+
 /// Serves a client until it disconnects.
-fn serve(stream: TcpStream, messages: &Receiver<Arc<Published>>) {
-    let Ok(mut socket) = tungstenite::accept_hdr(stream, agree) else { return };
-    // A client that disconnects ends in an error.
-    let _ = greet(&mut socket).and_then(|()| talk(&mut socket, messages));
+fn serve(stream: TcpStream, clients: &Clients) -> tungstenite::Result<()> {
+    stream.set_read_timeout(Some(PATIENCE))?;
+    stream.set_write_timeout(Some(PATIENCE))?;
+    let Ok(mut socket) = tungstenite::accept_hdr(stream, agree) else { return Ok(()) };
+    let (sender, messages) = sync_channel(WAITING);
+    lock(clients).push(sender);
+    greet(&mut socket)?;
+    talk(&mut socket, &messages)
+}
+
+/// Whether a page of this origin may read the log: one of this machine or of a known viewer. A
+/// program that is no web page has none, or one that no web page can have.
+fn may_read(origin: &str) -> bool {
+    let Some((scheme, rest)) = origin.split_once("://") else { return false };
+    let host = rest.rsplit_once(':').filter(|(_, port)| port.parse::<u16>().is_ok());
+    let host = host.map_or(rest, |(host, _)| host);
+    !matches!(scheme, "http" | "https")
+        || ["localhost", "127.0.0.1", "[::1]"].contains(&host)
+        || VIEWERS.contains(&origin)
 }
 
 /// Accepts the first of the protocol's names that the client offers.
 #[expect(clippy::result_large_err, reason = "the type of the callback is the library's")]
 fn agree(request: &Request, mut response: Response) -> Result<Response, ErrorResponse> {
+    let refused = |status: StatusCode, why: String| {
+        let mut refused = ErrorResponse::new(Some(why));
+        *refused.status_mut() = status;
+        refused
+    };
+    if let Some(origin) = request.headers().get(ORIGIN)
+        && !origin.to_str().is_ok_and(may_read)
+    {
+        let why = "this page may not read the log".to_owned();
+        return Err(refused(StatusCode::FORBIDDEN, why));
+    }
     let offered = request.headers().get_all(SEC_WEBSOCKET_PROTOCOL).iter();
     let offered: Vec<&str> = offered
         .filter_map(|value| value.to_str().ok())
@@ -101,9 +156,8 @@ fn agree(request: &Request, mut response: Response) -> Result<Response, ErrorRes
         .map(str::trim)
         .collect();
     let Some(name) = PROTOCOLS.into_iter().find(|name| offered.contains(name)) else {
-        let mut refused = ErrorResponse::new(Some(format!("expected {}", PROTOCOLS.join(" or "))));
-        *refused.status_mut() = StatusCode::BAD_REQUEST;
-        return Err(refused);
+        let why = format!("expected {}", PROTOCOLS.join(" or "));
+        return Err(refused(StatusCode::BAD_REQUEST, why));
     };
     response.headers_mut().insert(SEC_WEBSOCKET_PROTOCOL, HeaderValue::from_static(name));
     Ok(response)
@@ -197,11 +251,21 @@ mod tests {
     type Client = WebSocket<TcpStream>;
 
     fn connect(server: &Server, protocol: &str) -> Result<Client, Box<tungstenite::Error>> {
+        connect_from(server, protocol, None)
+    }
+
+    fn connect_from(
+        server: &Server,
+        protocol: &str,
+        origin: Option<&'static str>,
+    ) -> Result<Client, Box<tungstenite::Error>> {
         let stream = TcpStream::connect(server.address()).unwrap();
         stream.set_read_timeout(Some(Duration::from_secs(5))).unwrap();
         let mut request = format!("ws://{}/", server.address()).into_client_request().unwrap();
         let value = HeaderValue::from_str(protocol).unwrap();
         request.headers_mut().insert(SEC_WEBSOCKET_PROTOCOL, value);
+        let origin = origin.map(|origin| (ORIGIN, HeaderValue::from_static(origin)));
+        request.headers_mut().extend(origin);
         match tungstenite::client(request, stream) {
             Ok((client, response)) => {
                 let agreed = response.headers().get(SEC_WEBSOCKET_PROTOCOL).unwrap();
@@ -264,6 +328,49 @@ mod tests {
     }
 
     #[test]
+    fn a_page_of_another_site_is_refused() {
+        let server = Server::bind("127.0.0.1:0").unwrap();
+        let from = |origin| connect_from(&server, PROTOCOLS[0], Some(origin)).is_ok();
+        for origin in ["http://localhost:8080", "http://127.0.0.1", "file://", VIEWERS[0]] {
+            assert!(from(origin), "{origin}");
+        }
+        for origin in ["https://example.com", "null", "http://localhost.example.com:80"] {
+            assert!(!from(origin), "{origin}");
+        }
+    }
+
+    #[test]
+    fn a_connection_that_says_nothing_takes_no_queue_and_there_are_not_too_many() {
+        let server = Server::bind("127.0.0.1:0").unwrap();
+        let silent: Vec<TcpStream> =
+            (0..MOST).map(|_| TcpStream::connect(server.address()).unwrap()).collect();
+        let mut late = TcpStream::connect(server.address()).unwrap();
+        late.set_read_timeout(Some(PATIENCE / 2)).unwrap();
+        // It is closed at once.
+        assert_eq!(io::Read::read(&mut late, &mut [0]).expect("closed"), 0);
+        assert_eq!(server.clients(), 0);
+        drop(silent);
+        let there = (0..500).any(|_| {
+            thread::sleep(Duration::from_millis(10));
+            connect(&server, PROTOCOLS[0]).is_ok()
+        });
+        assert!(there);
+    }
+
+    #[test]
+    fn a_connection_that_fails_ends_no_other() {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let server =
+            Server { address: listener.local_addr().unwrap(), clients: Clients::default() };
+        let clients = Arc::clone(&server.clients);
+        thread::spawn(move || {
+            let failed = std::iter::once(Err(ErrorKind::ConnectionAborted.into()));
+            accept(failed.chain(listener.incoming()), &clients);
+        });
+        assert!(connect(&server, PROTOCOLS[0]).is_ok());
+    }
+
+    #[test]
     fn subscriptions_end_and_nonsense_is_ignored() {
         let mut subscribed = HashMap::new();
         for text in [
@@ -281,14 +388,16 @@ mod tests {
     #[test]
     fn a_client_that_disconnects_is_forgotten() {
         let server = Server::bind("127.0.0.1:0").unwrap();
+        let becomes = |count| {
+            (0..500).any(|_| {
+                server.publish(Topic::Log, 0, Vec::new());
+                thread::sleep(Duration::from_millis(10));
+                server.clients() == count
+            })
+        };
         let client = connect(&server, PROTOCOLS[1]).unwrap();
-        assert_eq!(server.clients(), 1);
+        assert!(becomes(1));
         drop(client);
-        let gone = (0..500).any(|_| {
-            server.publish(Topic::Log, 0, Vec::new());
-            thread::sleep(Duration::from_millis(10));
-            server.clients() == 0
-        });
-        assert!(gone);
+        assert!(becomes(0));
     }
 }

@@ -18,7 +18,6 @@ pub struct Drawn {
 }
 
 /// The mismatch of these seeds: every key that is not neutral in all of them.
-#[must_use]
 pub(super) fn mismatch(scenario: &Scenario, seeds: &[u64]) -> Vec<Drawn> {
     let of = |seed: u64| {
         let mut scenario = scenario.clone();

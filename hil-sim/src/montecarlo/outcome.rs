@@ -114,7 +114,6 @@ pub struct Outcome {
 
 impl Outcome {
     /// The campaign of these runs.
-    #[must_use]
     pub fn of(lines: &[RunLine]) -> Self {
         let figure = |pick: &dyn Fn(&RunLine) -> Option<f64>| -> Vec<(f64, u64)> {
             lines.iter().filter_map(|line| Some((pick(line)?, line.seed))).collect()
@@ -149,7 +148,6 @@ impl Outcome {
     }
 
     /// The same with what these seeds of the scenario draw.
-    #[must_use]
     pub fn drawn_from(self, scenario: &Scenario, seeds: &[u64]) -> Self {
         Self { drawn: drawn::mismatch(scenario, seeds), ..self }
     }

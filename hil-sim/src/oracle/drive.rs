@@ -5,7 +5,7 @@
 use super::profile::{Limits, Motion, Slow};
 use crate::plant::actuators::Pretightener;
 use crate::plant::rig::{Drives, PlantError, VirtualRig};
-use crate::session::{LONGEST_S, TICK_S};
+use crate::session::TICK_S;
 
 /// Time within which the screw is to make up for what it lacks, s.
 const CATCHES_UP_S: f64 = 0.02;
@@ -99,7 +99,7 @@ impl Driven {
     pub(super) fn run_out(&mut self) -> Result<bool, PlantError> {
         let preload_n = self.plant.truth().preload_n;
         let mut moved = false;
-        while self.time_s() < LONGEST_S {
+        while self.time_s() < self.limits.longest_s {
             self.step(0.0, None, preload_n)?;
             moved |= self.motion.speed > 1.0;
             if moved && self.motion.speed < STANDS_MM_S {

@@ -2,7 +2,7 @@
 
 use interstage::rig::Rig;
 
-use crate::session::TICK_S;
+use crate::session::{TICK_S, longest_s};
 
 /// A stretch of the run that is crossed slowly: its ends, mm along the run, and its speed, mm/s.
 pub(super) type Slow = Option<(f64, f64, f64)>;
@@ -19,6 +19,8 @@ pub(super) struct Limits {
     pub(super) sign: f64,
     /// Coordinate of the end of travel, mm.
     pub(super) end_mm: f64,
+    /// Longest run, s.
+    pub(super) longest_s: f64,
 }
 
 impl Limits {
@@ -30,6 +32,7 @@ impl Limits {
             screw_n: (f64::NEG_INFINITY, 1.25 * rig.preload.limit_n),
             sign: if forward { 1.0 } else { -1.0 },
             end_mm: if forward { rig.rig.travel_mm } else { 0.0 },
+            longest_s: longest_s(rig),
         }
     }
 

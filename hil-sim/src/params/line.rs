@@ -8,61 +8,34 @@ use interstage::params::service::{Description, Origin, PIECE, Piece, Request, Re
 use super::{Held, Store, StoreError};
 use crate::probe::Port;
 
-/// Timeout of an answer, ms of the board's time: erasing takes 50.
-const TIMEOUT_MS: u32 = 1000;
-
-/// Steps of waiting, ms.
-const STEP_MS: u32 = 5;
-
-/// The line to a board: bytes down, bytes up, and its time.
-pub trait Wire {
-    /// Sends as many bytes as there is room for; returns how many.
-    fn send(&mut self, bytes: &[u8]) -> Result<usize, String>;
-
-    /// Waits so many milliseconds and returns the bytes received.
-    fn receive(&mut self, milliseconds: u32) -> Result<Vec<u8>, String>;
-}
+/// Timeout of an answer: erasing takes 50 ms.
+const TIMEOUT: Duration = Duration::from_secs(1);
 
 /// RTT channels of the line, down and up.
 const DOWN: u32 = 1;
 const UP: u32 = 2;
 
-impl Wire for &mut dyn Port {
-    fn send(&mut self, bytes: &[u8]) -> Result<usize, String> {
-        self.down(DOWN, bytes).map_err(|error| error.to_string())
-    }
-
-    fn receive(&mut self, milliseconds: u32) -> Result<Vec<u8>, String> {
-        let (mut passed, wanted) = (Duration::ZERO, Duration::from_millis(milliseconds.into()));
-        while passed < wanted {
-            passed += self.pass().map_err(|error| error.to_string())?;
-        }
-        self.up(UP).map_err(|error| error.to_string())
-    }
-}
-
 /// Asks a board about its parameters.
-#[derive(Debug)]
-pub struct Client<W> {
-    wire: W,
+pub struct Client<P> {
+    port: P,
     gatherer: FrameReader,
     number: u16,
 }
 
-impl<W: Wire> Client<W> {
-    /// Over this line.
-    pub const fn new(wire: W) -> Self {
-        Self { wire, gatherer: FrameReader::new(), number: 0 }
+impl<P: Port> Client<P> {
+    /// Over this port.
+    pub const fn new(port: P) -> Self {
+        Self { port, gatherer: FrameReader::new(), number: 0 }
     }
 
-    /// The line.
-    pub fn into_wire(self) -> W {
-        self.wire
+    /// The port.
+    pub fn into_port(self) -> P {
+        self.port
     }
 
-    /// The line, to listen to it.
-    pub(crate) const fn wire_mut(&mut self) -> &mut W {
-        &mut self.wire
+    /// The port, to listen to it.
+    pub(crate) const fn port_mut(&mut self) -> &mut P {
+        &mut self.port
     }
 
     /// One request, one answer; ignores answers to earlier requests.
@@ -71,9 +44,11 @@ impl<W: Wire> Client<W> {
         let message = ToBoard::Parameters(self.number, request);
         let bytes = frame(&message).ok_or(StoreError::Answer)?;
         let mut left = bytes.as_slice();
-        for _ in 0..TIMEOUT_MS / STEP_MS {
-            left = &left[self.wire.send(left).map_err(StoreError::Wire)?..];
-            for byte in self.wire.receive(STEP_MS).map_err(StoreError::Wire)? {
+        let since = self.port.now();
+        while self.port.now().saturating_sub(since) < TIMEOUT {
+            left = &left[self.port.down(DOWN, left)?..];
+            self.port.pass()?;
+            for byte in self.port.up(UP)? {
                 match self.gatherer.take(byte) {
                     Some(ToHost::Parameters(number, response)) if number == self.number => {
                         return match response {
@@ -87,7 +62,7 @@ impl<W: Wire> Client<W> {
                 }
             }
         }
-        Err(StoreError::Silent { seconds: f64::from(TIMEOUT_MS) / 1000.0 })
+        Err(StoreError::Silent { seconds: TIMEOUT.as_secs_f64() })
     }
 
     fn done(&mut self, request: Request) -> Result<(), StoreError> {
@@ -121,7 +96,7 @@ impl<W: Wire> Client<W> {
     }
 }
 
-impl<W: Wire> Store for Client<W> {
+impl<P: Port> Store for Client<P> {
     fn held(&mut self) -> Result<Held, StoreError> {
         let description = self.describe()?;
         let origin = match description.origin {
@@ -151,6 +126,7 @@ impl<W: Wire> Store for Client<W> {
 mod tests {
     use super::*;
     use crate::params::set_of;
+    use crate::probe::{Mute, PortError};
     use interstage::params::service::Service;
     use interstage::params::slots::{
         FlashFault, PAGE_BYTES, SLOT_BYTES, SetMemory, Slot, WORD_BYTES,
@@ -189,6 +165,7 @@ mod tests {
         /// Every so many bytes down are lost; 0 for none.
         loses: usize,
         seen: usize,
+        now: Duration,
     }
 
     impl Board {
@@ -202,12 +179,13 @@ mod tests {
                 at_rest: true,
                 loses: 0,
                 seen: 0,
+                now: Duration::ZERO,
             }
         }
     }
 
-    impl Wire for Board {
-        fn send(&mut self, bytes: &[u8]) -> Result<usize, String> {
+    impl Port for Board {
+        fn down(&mut self, _: u32, bytes: &[u8]) -> Result<usize, PortError> {
             let taken = bytes.len().min(7);
             for byte in &bytes[..taken] {
                 self.seen += 1;
@@ -224,9 +202,26 @@ mod tests {
             Ok(taken)
         }
 
-        fn receive(&mut self, _: u32) -> Result<Vec<u8>, String> {
+        fn up(&mut self, _: u32) -> Result<Vec<u8>, PortError> {
             let half = self.answers.len().div_ceil(2);
             Ok(self.answers.drain(..half).collect())
+        }
+
+        fn reset(&mut self) -> Result<(), PortError> {
+            panic!("parameters take no reset");
+        }
+
+        fn memory(&mut self, _: u32, _: &mut [u8]) -> Result<(), PortError> {
+            panic!("memory is not read");
+        }
+
+        fn pass(&mut self) -> Result<(), PortError> {
+            self.now += Duration::from_millis(5);
+            Ok(())
+        }
+
+        fn now(&self) -> Duration {
+            self.now
         }
     }
 
@@ -259,7 +254,15 @@ mod tests {
         let mut client = Client::new(board);
         let error = client.put(&set_of("fe", &Rig::fe()).unwrap()).unwrap_err();
         assert!(matches!(error, StoreError::Silent { .. }), "{error}");
-        client.wire.loses = 0;
+        client.port.loses = 0;
         assert_eq!(client.held().unwrap().rig, Rig::prototype());
+    }
+    #[test]
+    fn a_slow_probe_does_not_stretch_the_timeout() {
+        let mut client = Client::new(Mute::new());
+        let error = client.ask(Request::Describe).unwrap_err();
+        assert!(matches!(error, StoreError::Silent { .. }), "{error}");
+        let waited = client.port.now();
+        assert!(waited < TIMEOUT + Duration::from_millis(20), "{waited:?}");
     }
 }

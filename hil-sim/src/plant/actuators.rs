@@ -50,7 +50,6 @@ impl DriveMotor {
     /// The worm gear locks itself: a load against the motion resists it, one along the
     /// motion does not help, and none turns a resting wheel. A disabled bridge stops
     /// the wheel within a few milliseconds.
-    #[must_use]
     pub fn turn(&self, speed: f64, duty: f64, enabled: bool, expected_n: f64, dt_s: f64) -> Turn {
         if !enabled {
             let stopped = speed * (-dt_s / STOPS_IN_S).exp();
@@ -91,7 +90,6 @@ impl DriveMotor {
     /// Output of the bridge, part of the supply, at tread speed `speed`: the duty, or what is
     /// left of it where the bridge regulates its current. Of the duty the motor works with
     /// `worked`; the rest is lost behind the bridge.
-    #[must_use]
     pub fn bridge_output(&self, duty: f64, worked: f64, speed: f64) -> f64 {
         let ideal = self.stall_n * (worked - speed / self.no_load_mm_s);
         let excess = ideal - ideal.clamp(-self.limit_n, self.limit_n);
@@ -153,7 +151,6 @@ pub struct Pretightener {
 
 impl Pretightener {
     /// A pre-tightener at `seat_n`, for a step of `dt_s`.
-    #[must_use]
     pub fn new(
         slew: f64,
         lag: f64,
@@ -178,7 +175,6 @@ impl Pretightener {
 
     /// The same with a motor whose speed falls by the part `droop` as it raises `limit_n`, and
     /// with friction that takes this part of full duty. At `limit_n` it still gives its slew.
-    #[must_use]
     pub fn with_losses(mut self, droop: f64, friction: f64, limit_n: f64) -> Self {
         (self.droop_per_n, self.friction) = (droop / limit_n, friction);
         self.slew /= 1.0 - droop - friction;
@@ -226,7 +222,6 @@ impl Pretightener {
 
     /// Force of the screw's position at the undeformed wheel on level 0, N; the
     /// spring adds its rate times what the wheel has moved inwards.
-    #[must_use]
     pub fn seat_n(&self) -> f64 {
         self.seat
     }

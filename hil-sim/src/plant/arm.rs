@@ -13,13 +13,11 @@ pub struct Arm {
 
 impl Arm {
     /// Angle from the pillar with the wheel centre at this radius, rad.
-    #[must_use]
     pub fn angle(&self, radius_mm: f64) -> f64 {
         ((radius_mm - self.pivot_mm) / self.length_mm).clamp(-1.0, 1.0).asin()
     }
 
     /// Radial force that an axial thrust adds, per unit of thrust.
-    #[must_use]
     pub fn thrust_ratio(&self, radius_mm: f64) -> f64 {
         // Tangent of the angle from its sine.
         let sine = ((radius_mm - self.pivot_mm) / self.length_mm).clamp(-1.0, 1.0);
@@ -44,7 +42,6 @@ impl ModeParameters {
     /// A mode at this frequency, Hz. The paper publishes 276 Hz for the constrained and 163 Hz
     /// for the free rig and nothing else: damping 0.02, modal mass 0.2 kg and shape 1 are chosen.
     /// The arm alone has 0.073 kg; wheel and motor move with its end.
-    #[must_use]
     pub const fn at(frequency_hz: f64) -> Self {
         Self { frequency_hz, damping: 0.02, mass_kg: 0.2, shape: 1.0 }
     }
@@ -89,7 +86,6 @@ pub struct Mode {
 
 impl Mode {
     /// A mode at rest.
-    #[must_use]
     pub fn new(parameters: ModeParameters) -> Self {
         let ModeParameters { frequency_hz, damping: zeta, mass_kg, shape } = parameters;
         let omega = std::f64::consts::TAU * frequency_hz;
@@ -142,13 +138,11 @@ impl Mode {
     }
 
     /// Deflection beyond that by which it holds the slow force, mm.
-    #[must_use]
     pub fn deflection_mm(&self) -> f64 {
         self.deflection - self.held
     }
 
     /// Elastic force of that deflection, N.
-    #[must_use]
     pub fn force_n(&self) -> f64 {
         self.deflection_mm() * self.stiffness
     }

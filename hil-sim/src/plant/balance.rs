@@ -100,7 +100,6 @@ impl Balance {
     }
 
     /// What presses the wheel at this lift, N, and how that grows, N/mm.
-    #[must_use]
     pub fn pressed(&self, lift_mm: f64) -> (f64, f64) {
         let spring = (self.preload_n + self.spring_n_per_mm * lift_mm).max(0.0);
         let pressed = (spring + self.arm_n).max(0.0);

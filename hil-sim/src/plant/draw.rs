@@ -137,14 +137,12 @@ impl Draw {
 
 impl PlantParameters {
     /// Friction of tread on wall at a position, mm.
-    #[must_use]
     pub fn friction_at(&self, position_mm: f64) -> f64 {
         let (amplitude, length_mm) = self.friction_waves;
         self.mu * (1.0 + amplitude * (std::f64::consts::TAU * position_mm / length_mm).sin())
     }
 
     /// The tread displaced along the wall.
-    #[must_use]
     pub fn shear(&self) -> Shear {
         Shear::of(&self.ring, self.wind_up.0 * self.wind_up.1)
     }
@@ -152,7 +150,6 @@ impl PlantParameters {
     /// The plant of a seed: `rig` with this spread, and with these steps, each its position
     /// and how much higher than the table says it is, mm. Seed 0 is the nominal rig without
     /// mismatch; its sensors still quantise and have their noise.
-    #[must_use]
     pub fn draw(
         rig: &Rig,
         steps: &[(f64, f64)],

@@ -28,15 +28,3 @@ pub struct Energy {
     /// Kinetic energy of rotor and carriage, now.
     pub kinetic_mj: f64,
 }
-
-impl Energy {
-    /// What the motor's work exceeds the sum of the others by, since `start`, mJ.
-    #[must_use]
-    pub fn missing_mj(&self, start: &Self) -> f64 {
-        let total = |e: &Self| {
-            let lost = e.gear_mj + e.worm_mj + e.creep_mj + e.tread_mj;
-            e.motor_mj - lost - e.load_mj - e.preload_mj - e.arm_mj - e.wound_mj - e.kinetic_mj
-        };
-        total(self) - total(start)
-    }
-}

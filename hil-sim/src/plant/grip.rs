@@ -76,7 +76,6 @@ pub struct Ended {
 impl Grip {
     /// Friction utilisation, traction over normal force, in a contact with these cosine and
     /// sine sums, N, and its derivatives by both, 1/N.
-    #[must_use]
     pub fn utilisation(&self, cosine: f64, sine: f64) -> (f64, (f64, f64)) {
         if cosine <= 0.0 {
             return (0.0, (0.0, 0.0));
@@ -125,7 +124,6 @@ impl Grip {
     }
 
     /// Speeds at the end with this utilisation.
-    #[must_use]
     pub fn ended(&self, utilisation: f64, cosine: f64, sine: f64) -> Ended {
         let traction = utilisation * cosine;
         let sense = sense_of(self.tread);
@@ -152,7 +150,6 @@ impl Grip {
 
     /// Speed of the tread over the wall without what winds it up, mm/s, at this tread's and
     /// carriage's speed and this traction.
-    #[must_use]
     pub fn creeps(&self, tread: f64, speed: f64, traction_n: f64) -> f64 {
         match self.gives {
             Gives::Creeps { .. } => self.advance * tread - speed,
@@ -164,7 +161,6 @@ impl Grip {
     }
 
     /// The part of it that is beyond elastic creep, mm/s.
-    #[must_use]
     pub fn slides(&self, ended: &Ended, utilisation: f64, cosine: f64) -> f64 {
         let slip =
             self.creeps(ended.tread, ended.speed, self.traction_n(utilisation, cosine)).abs();
@@ -180,7 +176,6 @@ impl Grip {
     }
 
     /// Traction at the tread, N, at this utilisation.
-    #[must_use]
     pub fn traction_n(&self, utilisation: f64, cosine: f64) -> f64 {
         utilisation * self.normal * cosine
     }

@@ -84,14 +84,12 @@ struct Open {
 
 impl Ledger {
     /// A ledger over these steps for a wheel of this radius, mm.
-    #[must_use]
     pub fn new(steps: Vec<Step>, radius_mm: f64) -> Self {
         Self { steps, radius_mm, done: Vec::new(), open: None }
     }
 
     /// Crossings whose gap is known, in the order they happened; one under way is taken
     /// off again if the wheel slides back where it came from.
-    #[must_use]
     pub fn crossings(&self) -> &[Crossing] {
         &self.done
     }

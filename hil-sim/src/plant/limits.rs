@@ -85,7 +85,6 @@ pub enum Refusal {
 
 impl Refusal {
     /// Its name in counts.
-    #[must_use]
     pub const fn name(&self) -> &'static str {
         match self {
             Self::Sinks { .. } => "preload sinks the wheel",
@@ -141,7 +140,6 @@ impl PlantParameters {
 
 /// Tangent of the direction from the wheel's centre to a corner this far above the lowest
 /// point of its rim, mm: axial over radial force of a frictionless contact there.
-#[must_use]
 pub fn leans(radius_mm: f64, above_mm: f64) -> f64 {
     let over = radius_mm - above_mm;
     (radius_mm * radius_mm - over * over).max(0.0).sqrt() / over.max(1e-9)
@@ -149,7 +147,6 @@ pub fn leans(radius_mm: f64, above_mm: f64) -> f64 {
 
 /// Energy that a corner of a step may bring into the tread, mJ: a fourth of what takes it to
 /// the depth allowed, `k L d^3/3`, for the rest of the tread is not as stiff.
-#[must_use]
 pub fn takes(ring: &RingParameters, step_mm: f64) -> f64 {
     let depth = (DEEPEST * ring.radius_mm).min(HIGHEST * ring.radius_mm - step_mm);
     ring.k_inf * ring.width_mm * depth.powi(3) / 12.0

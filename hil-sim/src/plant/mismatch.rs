@@ -97,7 +97,6 @@ pub struct Field {
 
 impl Field {
     /// Whether the wide draw draws it.
-    #[must_use]
     pub fn is_drawn(&self) -> bool {
         self.wide.0 < self.wide.1
     }
@@ -155,7 +154,6 @@ fields! {
 impl Mismatch {
     /// The wide draw of a seed: each value evenly within its range, a factor evenly in its
     /// logarithm. A value that is not neutral stays. `beyond`: names with another range.
-    #[must_use]
     pub fn draw(&self, seed: u64, beyond: &[(&str, (f64, f64))]) -> Self {
         // Another stream than that of the spread and those of the sensors.
         let mut random = ChaCha8Rng::seed_from_u64(seed ^ 0x0031_5a7c_0000_0000);
@@ -186,7 +184,6 @@ impl Mismatch {
 
 impl RingParameters {
     /// This wheel and rubber with what the controller is not told of.
-    #[must_use]
     pub fn with_mismatch(mut self, mismatch: &Mismatch) -> Self {
         let Mismatch { tread_stiffness, tread_stiffening, tread_tau, .. } = *mismatch;
         // Rubber that softens at once does not exist.
@@ -204,7 +201,6 @@ impl RingParameters {
 
 impl PlantParameters {
     /// This plant with what the controller is not told of.
-    #[must_use]
     pub fn with_mismatch(mut self, mismatch: &Mismatch) -> Self {
         self.mu *= mismatch.friction;
         self.ring = self.ring.with_mismatch(mismatch);

@@ -16,7 +16,6 @@ pub struct Pivot {
 
 impl Pivot {
     /// A pivot with this friction, N at the wheel, relaxed.
-    #[must_use]
     pub const fn new(friction_n: f64) -> Self {
         Self { friction_n, bent_mm: 0.0 }
     }
@@ -27,7 +26,6 @@ impl Pivot {
     }
 
     /// Force that presses the wheel to the wall, N: against its motion.
-    #[must_use]
     pub fn force_n(&self) -> f64 {
         self.friction_n * self.bent_mm / TURNS_IN_MM
     }
@@ -46,13 +44,11 @@ pub struct Play {
 
 impl Play {
     /// Play of this width, mm, the wheel on the flank that drives it forwards.
-    #[must_use]
     pub const fn new(width_mm: f64) -> Self {
         Self { width_mm, ahead_mm: 0.0, free: None }
     }
 
     /// Speed of the motor while the wheel is between the flanks, mm/s.
-    #[must_use]
     pub const fn motor_mm_s(&self) -> Option<f64> {
         self.free
     }

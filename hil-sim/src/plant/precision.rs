@@ -26,19 +26,16 @@ pub struct Setting {
 
 impl Setting {
     /// As deployments are computed.
-    #[must_use]
     pub fn usual() -> Self {
         Self { elements: ELEMENTS, stride_mm: Resolution::default().stride_mm }
     }
 
     /// This much finer in both.
-    #[must_use]
     pub fn finer(self, times: usize) -> Self {
         Self { elements: self.elements * times, stride_mm: self.stride_mm / times as f64 }
     }
 
     /// From coarse to fine: the settings of the curve.
-    #[must_use]
     pub fn sweep() -> Vec<Self> {
         let strides = [0.08, 0.04, 0.02, 0.01];
         let of = |elements| strides.map(|stride_mm| Self { elements, stride_mm });

@@ -26,6 +26,8 @@ pub use error::PlantError;
 pub use phases::{PHASES, Phase, PhaseWork};
 pub use truth::Truth;
 
+/// How much farther the screw retreats than each step is high, mm.
+const STEP_ROOM_MM: f64 = 1.0;
 /// Most ring steps in a call: 10 mm of travel at the usual stride.
 const MOST_STRIDES: f64 = 256.0;
 
@@ -68,7 +70,6 @@ pub struct Drives {
 
 impl Drives {
     /// Duty that drive and pre-tightener work with.
-    #[must_use]
     pub fn worked(&self) -> [f64; 2] {
         [self.drive * (1.0 - self.lost[0]), self.preload * (1.0 - self.lost[1])]
     }
@@ -141,7 +142,6 @@ pub struct VirtualRig {
 
 impl VirtualRig {
     /// A rig at `position_mm` with the pre-tightener set to `preload_n` there, at rest.
-    #[must_use]
     pub fn new(parameters: PlantParameters, position_mm: f64, preload_n: f64, dt_s: f64) -> Self {
         let local = parameters.wall.local(position_mm);
         let radius = parameters.ring.radius_mm;
@@ -158,10 +158,9 @@ impl VirtualRig {
             });
         let rise = local.base_mm + height_mm - radius;
         let seat = preload_n - parameters.spring_n_per_mm * rise;
-        let range = (
-            -parameters.spring_n_per_mm * parameters.wall.steps().len() as f64 * 5.0,
-            parameters.seat_max_n,
-        );
+        let steps = parameters.wall.steps().iter();
+        let highest_mm: f64 = steps.map(|step| step.height_mm.max(0.0) + STEP_ROOM_MM).sum();
+        let range = (-parameters.spring_n_per_mm * highest_mm, parameters.seat_max_n);
         let preload = Pretightener::new(
             parameters.slew_n_per_s,
             parameters.lag_s,
@@ -228,14 +227,12 @@ impl VirtualRig {
     }
 
     /// The same rig computed at another resolution.
-    #[must_use]
     pub fn with_resolution(mut self, resolution: Resolution) -> Self {
         self.resolution = resolution;
         self
     }
 
     /// The same rig, its wheel already rolling steadily at this speed, mm/s.
-    #[must_use]
     pub fn with_speed(mut self, speed_mm_s: f64) -> Self {
         self.truth.tread_mm_s = speed_mm_s;
         self.truth.speed_mm_s = speed_mm_s;
@@ -248,32 +245,27 @@ impl VirtualRig {
 
     /// The same rig with every ring element visited that faces the wall, in reach or not.
     /// No bit of any result depends on it: it proves that skipping is exact.
-    #[must_use]
     pub fn visiting_all(mut self) -> Self {
         self.ring = self.ring.visiting_all();
         self
     }
 
     /// Where the drive's work has gone.
-    #[must_use]
     pub fn energy(&self) -> &Energy {
         &self.energy
     }
 
     /// What is true now.
-    #[must_use]
     pub fn truth(&self) -> &Truth {
         &self.truth
     }
 
     /// Crossings so far.
-    #[must_use]
     pub fn ledger(&self) -> &Ledger {
         &self.ledger
     }
 
     /// Parameters of this plant.
-    #[must_use]
     pub fn parameters(&self) -> &PlantParameters {
         &self.parameters
     }

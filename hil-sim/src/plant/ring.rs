@@ -97,7 +97,6 @@ pub struct Motion {
 
 impl Ring {
     /// A ring at rest and unloaded.
-    #[must_use]
     pub fn new(parameters: RingParameters) -> Self {
         let count = parameters.elements;
         let blocks = count.div_ceil(LANES);
@@ -130,14 +129,12 @@ impl Ring {
 
     /// The same ring, visiting every element that faces the wall, in reach or not: for
     /// proof that the others change nothing.
-    #[must_use]
     pub fn visiting_all(mut self) -> Self {
         self.visit_all = true;
         self
     }
 
     /// What the elements took up, mJ: stored in those in contact, the rest lost in them.
-    #[must_use]
     pub fn taken_mj(&self) -> f64 {
         self.taken_mj
     }
@@ -150,7 +147,6 @@ impl Ring {
     }
 
     /// Wheel and rubber.
-    #[must_use]
     pub fn parameters(&self) -> &RingParameters {
         &self.parameters
     }
@@ -161,7 +157,6 @@ impl Ring {
     }
 
     /// Contact after `motion`, leaving the elements as they are.
-    #[must_use]
     pub fn trial(&mut self, motion: &Motion) -> Contact {
         if self.coupled.is_some() {
             return self.trial_coupled(motion);
@@ -212,7 +207,6 @@ impl Ring {
 
     /// Mean depth of the patch, mm, each part weighted with the pressure that it carries, and
     /// by 5/4, so that on a level wall it is the deepest; zero off the wall.
-    #[must_use]
     pub fn carrying_mm(&self) -> f64 {
         if let Some(coupled) = &self.coupled {
             return coupled.carrying_mm();

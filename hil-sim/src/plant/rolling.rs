@@ -24,7 +24,6 @@ pub struct Rolling {
 }
 
 /// Steady contact at this height and tread speed (mm/s, signed).
-#[must_use]
 pub fn at_height(ring: &RingParameters, height_mm: f64, speed_mm_s: f64) -> Rolling {
     sum(ring, height_mm, speed_mm_s, NODES)
 }
@@ -52,7 +51,6 @@ fn sum(ring: &RingParameters, height_mm: f64, speed_mm_s: f64, nodes: usize) -> 
 
 /// Height at which steady rolling carries what is asked: `balance` gives residual,
 /// N, from the contact; it must fall as the height grows. `guess` speeds it up.
-#[must_use]
 pub fn solve(
     ring: &RingParameters,
     speed_mm_s: f64,
@@ -131,7 +129,6 @@ pub struct Tangent {
 
 impl Tangent {
     /// Taken at this height above the wall, mm, and tread speed, mm/s; none off the wall.
-    #[must_use]
     pub fn new(ring: &RingParameters, height_mm: f64, speed_mm_s: f64) -> Option<Self> {
         let depth = ring.radius_mm - height_mm;
         if depth <= 0.0 {
@@ -154,14 +151,12 @@ impl Tangent {
     }
 
     /// Whether it holds at this height and speed.
-    #[must_use]
     pub fn holds(&self, ring: &RingParameters, height_mm: f64, speed_mm_s: f64) -> bool {
         (ring.radius_mm - height_mm - self.depth).abs() <= NEAR * self.depth
             && (speed_mm_s - self.speed).abs() <= NEAR * self.speed.abs()
     }
 
     /// Contact at this height and tread speed.
-    #[must_use]
     pub fn at(&self, ring: &RingParameters, height_mm: f64, speed_mm_s: f64) -> Rolling {
         let depth = ring.radius_mm - height_mm;
         if depth <= 0.0 {
@@ -237,7 +232,6 @@ impl Steady {
 
 /// Depth and internal displacements (mm) across the patch, by angle from straight
 /// down, for seeding the ring.
-#[must_use]
 pub fn profile(
     ring: &RingParameters,
     height_mm: f64,
@@ -252,7 +246,6 @@ pub fn profile(
 }
 
 /// Mean depth of the patch as [`super::ring::Ring::carrying_mm`] has it, mm.
-#[must_use]
 pub fn carrying_mm(ring: &RingParameters, height_mm: f64, speed_mm_s: f64) -> f64 {
     let (mut carried, mut sum) = (0.0, 0.0);
     walk(ring, height_mm, speed_mm_s, NODES, |_, _, depth, q| {

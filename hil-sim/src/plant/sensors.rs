@@ -91,7 +91,6 @@ const FULL: f64 = 0.90;
 
 impl Sensors {
     /// Sensors whose noise follows `seed`.
-    #[must_use]
     pub fn new(parameters: SensorParameters, seed: u64) -> Self {
         // Another stream than the plant's draw, which has the seed itself.
         let noise = ChaCha8Rng::seed_from_u64(seed ^ 0x005e_4504_0153_0000);

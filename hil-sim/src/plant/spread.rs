@@ -53,7 +53,6 @@ pub struct Spread {
 
 impl Spread {
     /// That of the usual rigs.
-    #[must_use]
     pub const fn usual() -> Self {
         Self {
             k_inf_rel: 0.04,
@@ -80,7 +79,6 @@ impl Spread {
     }
 
     /// No spread: every seed draws the nominal plant.
-    #[must_use]
     pub fn none() -> Self {
         Self::default()
     }
@@ -110,7 +108,6 @@ pub struct Noise {
 
 impl Noise {
     /// That of the usual sensors.
-    #[must_use]
     pub const fn usual() -> Self {
         Self {
             preload_sensor_n: 0.05,
@@ -125,7 +122,6 @@ impl Noise {
     }
 
     /// Ideal sensors: quantised, but without noise and delay.
-    #[must_use]
     pub fn none() -> Self {
         Self::default()
     }

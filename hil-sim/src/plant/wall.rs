@@ -1,5 +1,5 @@
 //! The inner wall of the sleeve along one meridian: level pieces with steps
-//! between them, and what a ray from the wheel centre meets.
+//! between them.
 
 /// A step: the wall rises by `height_mm` towards the pillar at `position_mm`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,7 +26,6 @@ pub struct Form {
 impl Form {
     /// Rise of the wall at an axial position, mm, and its slope: a straight line and a
     /// parabola, which go on beyond the ends.
-    #[must_use]
     pub fn rise(&self, x_mm: f64) -> (f64, f64) {
         if (self.taper_mm, self.bend_mm) == (0.0, 0.0) {
             return (0.0, 0.0);
@@ -36,6 +35,11 @@ impl Form {
         let slope = self.taper_mm + 4.0 * self.bend_mm * (1.0 - 2.0 * part);
         (rise, slope / self.length_mm)
     }
+}
+
+/// How far before the face of a step an undeformed wheel touches its corner, mm.
+pub fn touch_mm(radius_mm: f64, step_mm: f64) -> f64 {
+    (step_mm * (2.0 * radius_mm - step_mm)).max(0.0).sqrt()
 }
 
 /// The wall's profile: ascending steps, level 0 before the first.
@@ -78,7 +82,6 @@ pub struct Edge {
 impl Edge {
     /// Its sine and cosine.
     #[inline]
-    #[must_use]
     pub(super) fn direction(&self) -> (f64, f64) {
         (self.sin, self.cos)
     }
@@ -87,7 +90,6 @@ impl Edge {
     /// sine and cosine of its angle. The wall ends there at once; without this a whole
     /// element would.
     #[inline]
-    #[must_use]
     pub fn covered(&self, sin: f64, cos: f64, pitch: f64) -> f64 {
         // Sine of the angle from the edge to the element.
         let within = self.sin * cos + self.cos * sin;
@@ -95,25 +97,14 @@ impl Edge {
     }
 }
 
-/// What a ray meets.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Facet {
-    /// The wall under the centre, or the one behind and below it.
-    Floor,
-    /// Face or top of the step ahead.
-    Step,
-}
-
 impl Wall {
     /// A wall with these steps, sorted by position.
-    #[must_use]
     pub fn new(mut steps: Vec<Step>) -> Self {
         steps.sort_by(|a, b| a.position_mm.total_cmp(&b.position_mm));
         Self { steps, form: Form::default() }
     }
 
     /// The same wall of this form.
-    #[must_use]
     pub fn with_form(mut self, form: Form) -> Self {
         let plain = (form.edge_radius_mm, form.taper_mm, form.bend_mm) == (0.0, 0.0, 0.0);
         self.form = if plain { Form::default() } else { form };
@@ -121,13 +112,11 @@ impl Wall {
     }
 
     /// The steps, ascending.
-    #[must_use]
     pub fn steps(&self) -> &[Step] {
         &self.steps
     }
 
     /// The wall around axial position `x_mm`.
-    #[must_use]
     pub fn local(&self, x_mm: f64) -> LocalWall {
         let (rise_mm, slope) = self.form.rise(x_mm);
         let mut local = LocalWall {
@@ -159,36 +148,13 @@ impl Wall {
 }
 
 impl LocalWall {
-    /// Distance from the centre, `y` mm above the wall under it, to the wall along
-    /// the ray at angle psi from straight down (positive ahead), given its sine and
-    /// cosine (> 0), and which part of the wall it meets.
-    #[inline]
-    #[must_use]
-    pub fn ray(&self, y: f64, sin: f64, cos: f64) -> (f64, Facet) {
-        let run = y * sin;
-        if run > self.ahead_mm * cos {
-            // Past the root of the step ahead: its face below the corner, else its top.
-            if (y - self.rise_mm) * sin <= self.ahead_mm * cos {
-                (self.ahead_mm / sin, Facet::Step)
-            } else {
-                ((y - self.rise_mm) / cos, Facet::Step)
-            }
-        } else if -run > self.behind_mm * cos {
-            ((y + self.drop_mm) / cos, Facet::Floor)
-        } else {
-            (y / cos, Facet::Floor)
-        }
-    }
-
     /// Cosine and sine sums of a contact with the level wall, turned by the wall's slope.
     #[inline]
-    #[must_use]
     pub(super) fn tilt(&self, (cosine, sine): (f64, f64)) -> (f64, f64) {
         (cosine - self.slope * sine, sine + self.slope * cosine)
     }
 
     /// The edge behind as seen from the centre, `y` mm above the wall under it.
-    #[must_use]
     pub fn edge(&self, y: f64) -> Edge {
         if self.behind_mm == f64::INFINITY {
             return Edge { sin: 1.0, cos: 0.0 };
@@ -199,7 +165,6 @@ impl LocalWall {
 
     /// Distance from the centre, `y` mm above the wall under it, to the nearest point
     /// of the wall: straight down or the corner ahead.
-    #[must_use]
     pub fn nearest(&self, y: f64) -> f64 {
         let round = self.edge_radius_mm;
         let over = y - self.rise_mm;
@@ -216,8 +181,38 @@ impl LocalWall {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
+
+    /// What a ray meets.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub(in crate::plant) enum Facet {
+        /// The wall under the centre, or the one behind and below it.
+        Floor,
+        /// Face or top of the step ahead.
+        Step,
+    }
+
+    impl LocalWall {
+        /// Distance from the centre, `y` mm above the wall under it, to the wall along
+        /// the ray at angle psi from straight down (positive ahead), given its sine and
+        /// cosine (> 0), and which part of the wall it meets.
+        pub(in crate::plant) fn ray(&self, y: f64, sin: f64, cos: f64) -> (f64, Facet) {
+            let run = y * sin;
+            if run > self.ahead_mm * cos {
+                // Past the root of the step ahead: its face below the corner, else its top.
+                if (y - self.rise_mm) * sin <= self.ahead_mm * cos {
+                    (self.ahead_mm / sin, Facet::Step)
+                } else {
+                    ((y - self.rise_mm) / cos, Facet::Step)
+                }
+            } else if -run > self.behind_mm * cos {
+                ((y + self.drop_mm) / cos, Facet::Floor)
+            } else {
+                (y / cos, Facet::Floor)
+            }
+        }
+    }
 
     #[test]
     fn rays_meet_floor_face_and_top_in_turn() {

@@ -61,7 +61,6 @@ impl Shear {
     /// a flat layer, the rim's rotation on the hub, and the curvature. Within 2 % of the sum over
     /// the waves of the layer (`ring::layer`), at 2.5 mm and from 3 to 16 mm thick. Steady creep
     /// is that of a half-space, `F / (pi G L a)` (Johnson, Contact Mechanics, 8.3).
-    #[must_use]
     pub fn of(ring: &RingParameters, compliance: f64) -> Self {
         let thickness = ring.thickness_mm();
         let per_modulus = ring.width_mm / compliance_of(ring.radius_mm, thickness, REFERENCE_MM);
@@ -75,7 +74,6 @@ impl Shear {
     }
 
     /// Whether it gives way at all.
-    #[must_use]
     pub fn gives_way(&self) -> bool {
         self.n_per_mm.is_finite()
     }
@@ -112,7 +110,6 @@ fn compliance_of(radius_mm: f64, thickness_mm: f64, contact_mm: f64) -> f64 {
 
 impl WindUp {
     /// The step of `dt_s`, rolling at this speed, mm/s, on a contact of this length, mm.
-    #[must_use]
     pub fn over(&self, shear: &Shear, rolling: f64, contact_mm: f64, dt_s: f64) -> Winding {
         let renewed = 2.0 * rolling / contact_mm;
         let follows = [0, 1].map(|i| {
@@ -135,7 +132,6 @@ impl WindUp {
     }
 
     /// Steady displacement under this traction, N, at this speed, mm/s.
-    #[must_use]
     pub fn steady(shear: &Shear, traction_n: f64, rolling: f64, contact_mm: f64) -> Self {
         let renewed = 2.0 * rolling / contact_mm;
         let mm = traction_n / shear.rolling_n_per_mm(renewed);
@@ -143,7 +139,6 @@ impl WindUp {
     }
 
     /// Stored energy, mJ.
-    #[must_use]
     pub fn stored_mj(&self, shear: &Shear) -> f64 {
         if !shear.gives_way() {
             return 0.0;
@@ -156,7 +151,6 @@ impl WindUp {
 
 impl Winding {
     /// The displacement at the end of the step under this traction, N.
-    #[must_use]
     pub fn end(&self, traction_n: f64) -> WindUp {
         let mm = (traction_n - self.free_n) / self.n_per_mm;
         WindUp { mm, memory_mm: self.follows.map(|(part, kept)| part * mm + kept) }

@@ -28,8 +28,7 @@ pub struct RealPort {
     channels: Channels<rtt::Rtt>,
     /// Address of the control block; unknown, it is searched for in RAM.
     block: Option<u32>,
-    /// Time that the accesses since the last pause took.
-    spent: Duration,
+    opened: Instant,
 }
 
 impl RealPort {
@@ -54,7 +53,7 @@ impl RealPort {
         let session = probe
             .attach(CHIP, Permissions::default())
             .map_err(|error| PortError::Gone(with_causes(&error)))?;
-        Ok(Self { session, channels: Channels::default(), block, spent: Duration::ZERO })
+        Ok(Self { session, channels: Channels::default(), block, opened: Instant::now() })
     }
 
     /// Puts an image into the board's flash and reads it back. Parameters stored there stay.
@@ -67,13 +66,8 @@ impl RealPort {
             .map_err(|error| PortError::Board(format!("flashing failed: {}", with_causes(&error))))
     }
 
-    /// Acts on channels and core, and notes how long it takes.
-    fn timed<T>(&mut self, act: impl FnOnce(&mut Channels<rtt::Rtt>, &mut Link<'_>) -> T) -> T {
-        let begun = Instant::now();
-        let mut link = Link { session: &mut self.session, block: self.block };
-        let done = act(&mut self.channels, &mut link);
-        self.spent += begun.elapsed();
-        done
+    const fn parts(&mut self) -> (&mut Channels<rtt::Rtt>, Link<'_>) {
+        (&mut self.channels, Link { session: &mut self.session, block: self.block })
     }
 }
 
@@ -171,11 +165,13 @@ fn missing(channel: u32) -> PortError {
 
 impl Port for RealPort {
     fn up(&mut self, channel: u32) -> Result<Vec<u8>, PortError> {
-        self.timed(|channels, link| channels.up(link, channel))
+        let (channels, mut link) = self.parts();
+        channels.up(&mut link, channel)
     }
 
     fn down(&mut self, channel: u32, bytes: &[u8]) -> Result<usize, PortError> {
-        self.timed(|channels, link| channels.down(link, channel, bytes))
+        let (channels, mut link) = self.parts();
+        channels.down(&mut link, channel, bytes)
     }
 
     fn reset(&mut self) -> Result<(), PortError> {
@@ -190,11 +186,15 @@ impl Port for RealPort {
     }
 
     fn memory(&mut self, address: u32, into: &mut [u8]) -> Result<(), PortError> {
-        self.timed(|_, link| link.core()?.read(address.into(), into).map_err(gone))
+        self.parts().1.core()?.read(address.into(), into).map_err(gone)
     }
 
-    fn pass(&mut self) -> Result<Duration, PortError> {
-        self.timed(|_, _| std::thread::sleep(PAUSE));
-        Ok(std::mem::take(&mut self.spent))
+    fn pass(&mut self) -> Result<(), PortError> {
+        std::thread::sleep(PAUSE);
+        Ok(())
+    }
+
+    fn now(&self) -> Duration {
+        self.opened.elapsed()
     }
 }

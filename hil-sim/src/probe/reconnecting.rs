@@ -18,6 +18,7 @@ pub struct ReconnectingPort<'a> {
     timeout: Duration,
     /// When it was lost, and when it was last tried.
     lost: Option<(Instant, Instant)>,
+    opened: Instant,
     news: Vec<String>,
 }
 
@@ -35,6 +36,7 @@ impl<'a> ReconnectingPort<'a> {
             pause,
             timeout,
             lost: None,
+            opened: Instant::now(),
             news: Vec::new(),
         })
     }
@@ -112,15 +114,15 @@ impl Port for ReconnectingPort<'_> {
         }
     }
 
-    fn pass(&mut self) -> Result<Duration, PortError> {
-        let pause = self.pause.min(Duration::from_millis(5));
-        self.attempt(None, |port| port.pass().map(Some))?.map_or_else(
-            || {
-                std::thread::sleep(pause);
-                Ok(pause)
-            },
-            Ok,
-        )
+    fn pass(&mut self) -> Result<(), PortError> {
+        if !self.attempt(false, |port| port.pass().map(|()| true))? {
+            std::thread::sleep(self.pause.min(Duration::from_millis(5)));
+        }
+        Ok(())
+    }
+
+    fn now(&self) -> Duration {
+        self.opened.elapsed()
     }
 }
 
@@ -180,8 +182,12 @@ pub(crate) mod tests {
             panic!("memory is not read");
         }
 
-        fn pass(&mut self) -> Result<Duration, PortError> {
-            Ok(Duration::ZERO)
+        fn pass(&mut self) -> Result<(), PortError> {
+            Ok(())
+        }
+
+        fn now(&self) -> Duration {
+            Duration::ZERO
         }
     }
 

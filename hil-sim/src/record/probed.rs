@@ -2,7 +2,9 @@
 
 use std::collections::VecDeque;
 
-use super::{Source, SourceError};
+use interstage::supervise::Command;
+
+use super::{Source, SourceError, letter};
 use crate::probe::{Port, ReconnectingPort};
 
 /// RTT channel of the binary log, up.
@@ -11,12 +13,15 @@ const LOG: u32 = 1;
 const CONSOLE: u32 = 0;
 /// Polls of the channel per call, so that the display is updated in between.
 const POLLS: u32 = 20;
+/// Letter of the command that stops the drive.
+const STOP: u8 = letter(Command::Stop);
 
 /// The log of a board at a probe. The board is not reset and gets only the operator's
 /// commands.
 ///
 /// The probe may be unplugged and the board may restart. The sequence numbers of the log show
-/// what was not read. The log ends when the port gives up.
+/// what was not read. The log ends when the port gives up. A command that cannot be sent at once is
+/// dropped, unless it is a stop.
 pub struct Probed<'a> {
     port: ReconnectingPort<'a>,
     letters: VecDeque<u8>,
@@ -28,18 +33,30 @@ impl<'a> Probed<'a> {
     pub const fn new(port: ReconnectingPort<'a>) -> Self {
         Self { port, letters: VecDeque::new(), news: Vec::new() }
     }
+
+    /// Drops what could not be sent, not to be sent later: the operator has to see the board as
+    /// it is then. A stop stays.
+    fn drop_unsent(&mut self) {
+        self.letters.retain(|letter| {
+            if *letter != STOP {
+                let key = char::from(*letter);
+                self.news.push(format!("`{key}` was not sent: the board has restarted or is gone"));
+            }
+            *letter == STOP
+        });
+    }
 }
 
 impl Source for Probed<'_> {
     fn read(&mut self) -> Result<Option<Vec<u8>>, SourceError> {
         let mut read = Vec::new();
         for _ in 0..POLLS {
-            if let Some(letter) = self.letters.pop_front()
-                && self.port.down(CONSOLE, &[letter])? == 0
-            {
-                // Not later: the operator has to see the board as it is then.
-                let key = char::from(letter);
-                self.news.push(format!("`{key}` was not sent: the board has restarted or is gone"));
+            if let Some(letter) = self.letters.front() {
+                if self.port.down(CONSOLE, &[*letter])? == 1 {
+                    self.letters.pop_front();
+                } else {
+                    self.drop_unsent();
+                }
             }
             read.extend(self.port.up(LOG)?);
             self.port.pass()?;
@@ -48,6 +65,10 @@ impl Source for Probed<'_> {
     }
 
     fn send(&mut self, letter: u8) -> Result<(), SourceError> {
+        // A stop waits for no other command.
+        if letter == STOP {
+            self.letters.clear();
+        }
         self.letters.push_back(letter);
         Ok(())
     }
@@ -132,6 +153,34 @@ mod tests {
         assert!(missing > 300, "{missing}");
         assert_eq!(run.counts.lost_ticks, missing as u64);
         assert!(replay(&run, &Rig::prototype()).unwrap().difference.is_none());
+    }
+
+    /// Letters that reach the board: typed in turn, each before one call of read; none while
+    /// the board takes none.
+    fn reached(script: Vec<Next>, typed: &[&[u8]]) -> Vec<u8> {
+        let (port, _) = open(script, Duration::from_secs(60));
+        let mut source = Probed::new(port);
+        for letters in typed {
+            letters.iter().for_each(|letter| source.send(*letter).unwrap());
+            source.read().unwrap();
+        }
+        source.letters.into()
+    }
+
+    #[test]
+    fn a_start_typed_while_the_probe_is_unplugged_is_never_sent() {
+        // Lost at the first poll, and away over both calls.
+        let away = || std::iter::once(Next::Opens).chain([Next::Unplugged]).collect();
+        assert_eq!(reached(away(), &[b"", b"s", b""]), b"");
+        // The cable is pulled as the letter is sent.
+        assert_eq!(reached(away(), &[b"s", b""]), b"");
+        assert_eq!(reached(away(), &[b"", b"x", b""]), b"x");
+    }
+
+    #[test]
+    fn a_stop_goes_before_whatever_waits() {
+        let full = std::iter::once(Next::Opens).chain((0..200).map(|_| Next::bytes(b"")));
+        assert_eq!(reached(full.collect(), &[b"srx", b""]), b"x");
     }
 
     #[test]

@@ -12,7 +12,6 @@ use interstage::supervise::Mode;
 use interstage::tick::Event;
 use interstage::units;
 use mcap::records::Record;
-use serde::de::DeserializeOwned;
 use serde_json::Value;
 
 use super::read::{MCAP, ReadError, content, is_table, parameters, records};
@@ -27,28 +26,33 @@ pub fn recordings(path: &Path) -> Result<Vec<Recording>, ReadError> {
     if is_table(&bytes) {
         return Err(ReadError::Table(path.display().to_string()));
     }
+    let mut strange = Vec::new();
     if bytes.starts_with(MCAP)
-        && let Some(recording) = with_truth(&bytes)
+        && let Some(recording) = with_truth(&bytes, &mut strange)
     {
         return Ok(vec![recording]);
     }
-    Ok(boots(&Run::read(path)?))
+    let mut recordings = boots(&Run::read(path)?);
+    recordings.iter_mut().for_each(|one| one.summary.missing.extend_from_slice(&strange));
+    Ok(recordings)
 }
 
-/// The recording in the log of a deployment; none if there is no summary in it.
-fn with_truth(bytes: &[u8]) -> Option<Recording> {
-    fn read<T: DeserializeOwned>(data: &[u8]) -> Option<T> {
-        serde_json::from_slice(data).ok()
-    }
+/// The recording in the log of a deployment; none if there is no summary in it, or none that
+/// this version reads. What it does not read is told in `strange`.
+fn with_truth(bytes: &[u8], strange: &mut Vec<String>) -> Option<Recording> {
     let (mut recording, mut summary, mut topics) = (Recording::default(), None, HashMap::new());
+    let mut left_out = (0, None);
     let end = records(bytes, |record| match record {
         Record::Channel(channel) => drop(topics.insert(channel.id, channel.topic)),
         Record::Metadata(metadata) => recording.parameters.extend(parameters(&metadata)),
         Record::Message { header, data } => match topics.get(&header.channel_id).map(|t| &**t) {
-            Some("/tick") => recording.rows.extend(read::<Tick>(&data)),
-            Some("/summary") => summary = read::<Summary>(&data),
+            Some("/tick") => match serde_json::from_slice::<Tick>(&data) {
+                Ok(tick) => recording.rows.push(tick),
+                Err(why) => left_out = (left_out.0 + 1, left_out.1.take().or(Some(why))),
+            },
+            Some("/summary") => summary = Some(serde_json::from_slice::<Summary>(&data)),
             Some("/log") => {
-                let text = read::<Value>(&data).unwrap_or_default();
+                let text = serde_json::from_slice::<Value>(&data).unwrap_or_default();
                 let text = text["message"].as_str().unwrap_or_default().to_owned();
                 recording.log.push(LogLine { t_s: header.log_time as f64 / 1e9, text });
             }
@@ -56,7 +60,18 @@ fn with_truth(bytes: &[u8]) -> Option<Recording> {
         },
         _ => {}
     });
-    recording.summary = summary.filter(|_| end.is_complete)?;
+    if let (count, Some(why)) = left_out {
+        strange.push(format!("{count} ticks of another version are left out: {why}"));
+    }
+    match summary.filter(|_| end.is_complete)? {
+        Ok(summary) => recording.summary = summary,
+        Err(why) => {
+            let what = "the truth, which another version has written";
+            strange.push(format!("{what}: its summary: {why}"));
+            return None;
+        }
+    }
+    recording.summary.missing.append(strange);
     Some(recording)
 }
 
@@ -217,6 +232,9 @@ fn crossing(run: &Run, line: &Line) -> CrossingLine {
 
 #[cfg(test)]
 mod tests {
+    use mcap::records::MessageHeader;
+    use serde_json::json;
+
     use super::*;
     use crate::record::write_mcap;
     use crate::session;
@@ -279,5 +297,50 @@ mod tests {
         assert!(mean < 50.0, "{mean} bytes a tick");
         let page = crate::report::html(&believed, &[]);
         assert!(page.contains("Deployed") && !page.contains("NaN"), "{}", &page[..2000]);
+    }
+    /// A log of these messages.
+    fn log(messages: &[(&str, Value)]) -> Vec<u8> {
+        let mut file = std::io::Cursor::new(Vec::new());
+        let mut writer = mcap::Writer::new(&mut file).unwrap();
+        for (topic, message) in messages {
+            let channel_id = writer.add_channel(0, topic, "json", &Default::default()).unwrap();
+            let header = MessageHeader { channel_id, sequence: 0, log_time: 0, publish_time: 0 };
+            writer.write_to_known_channel(&header, message.to_string().as_bytes()).unwrap();
+        }
+        writer.finish().unwrap();
+        drop(writer);
+        file.into_inner()
+    }
+
+    #[test]
+    fn what_another_version_has_written_is_kept_as_far_as_it_goes_and_named() {
+        let mut tick = json!({ "tick": 1, "position_true_mm": 2.0, "slip_mm": 0.5 });
+        let mut strange_tick = tick.clone();
+        strange_tick["mode"] = "hovering".into();
+        let summary = json!(Summary::default());
+        let read = |messages: &[(&str, Value)]| {
+            let mut strange = Vec::new();
+            let recording = with_truth(&log(messages), &mut strange);
+            (recording, strange)
+        };
+        let all = [("/tick", tick.clone()), ("/tick", strange_tick), ("/summary", summary.clone())];
+        let (recording, _) = read(&all);
+        let recording = recording.expect("a summary");
+        // A column that was not there yet takes no other one with it.
+        let truth = recording.rows[0].truth.expect("the truth");
+        assert_eq!((truth.position_true_mm, truth.slip_mm), (2.0, 0.5));
+        assert!(truth.preload_true_n.is_nan());
+        let missing = &recording.summary.missing;
+        assert!(missing.len() == 1 && missing[0].contains("1 ticks"), "{missing:?}");
+        assert!(missing[0].contains("hovering"), "{missing:?}");
+        // A truth of another form is no tick without truth.
+        tick["slip_mm"] = "none".into();
+        let (recording, _) = read(&[("/tick", tick), ("/summary", summary.clone())]);
+        assert_eq!(recording.expect("a summary").summary.missing.len(), 1);
+        let mut old = summary;
+        old.as_object_mut().unwrap().remove("trace_digest");
+        let (recording, strange) = read(&[("/summary", old)]);
+        assert!(recording.is_none());
+        assert!(strange.len() == 1 && strange[0].contains("trace_digest"), "{strange:?}");
     }
 }

@@ -88,8 +88,6 @@ impl Source for Bytes {
 
 /// Ticks that the controller on this host runs per call.
 const TICKS: u32 = 20;
-/// Longest run without an operator, s.
-const LONGEST_S: f64 = 120.0;
 
 /// The controller on this host, in closed loop with the plant.
 pub struct Virtual {
@@ -98,6 +96,8 @@ pub struct Virtual {
     /// Command as soon as the drive is idle; none if an operator commands.
     start: Option<Command>,
     attended: bool,
+    /// Longest run without an operator, s.
+    longest_s: f64,
     /// Ticks still logged after the end.
     left: u32,
 }
@@ -106,12 +106,13 @@ impl Virtual {
     /// A session of this scenario. Unless an operator attends it, it starts by itself and
     /// ends when the drive has arrived.
     pub fn new(scenario: &Scenario, attended: bool) -> Result<Self, session::RunError> {
-        let options = session::Options { rows: true, ..session::Options::default() };
+        let session = Session::new(scenario, session::Options::default())?;
         Ok(Self {
-            session: Some(Session::new(scenario, options)?),
+            session: Some(session.logging()),
             letters: VecDeque::new(),
             start: (!attended).then(|| starter(scenario.run.direction)),
             attended,
+            longest_s: session::longest_s(&scenario.rig),
             left: 100,
         })
     }
@@ -119,7 +120,7 @@ impl Virtual {
     fn tick(&mut self) -> Result<bool, SourceError> {
         let Some(session) = &mut self.session else { return Ok(false) };
         let over = matches!(session.mode(), Mode::Complete(_) | Mode::FaultHold(_));
-        if !self.attended && (over || session.time_s() >= LONGEST_S) {
+        if !self.attended && (over || session.time_s() >= self.longest_s) {
             self.left = self.left.saturating_sub(1);
             if self.left == 0 {
                 return Ok(false);
@@ -167,6 +168,13 @@ mod tests {
         let last = run.rows.last().and_then(Controller::mode).unwrap();
         assert!(matches!(last, Mode::Complete(_)), "{last:?}");
         assert_eq!(run.ledger.len(), 3);
+    }
+
+    #[test]
+    fn rows_that_nobody_reads_are_not_kept() {
+        let mut source = Virtual::new(&Scenario::default(), true).unwrap();
+        (0..100).for_each(|_| assert!(!source.read().unwrap().unwrap().is_empty()));
+        assert!(source.session.unwrap().finish(1.0).rows.is_empty());
     }
 
     #[test]

@@ -117,6 +117,9 @@ pub struct Summary {
     pub lost: Option<TimeLost>,
     /// From boot to the end of the run, s.
     pub total_s: f64,
+    /// Longest time that it was given, s, if that cut it off.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cut_off_s: Option<f64>,
     /// Distance travelled, mm.
     pub travel_mm: f64,
     /// Reference gap of the schedule, mm.
@@ -181,6 +184,6 @@ fn nan() -> f64 {
 }
 
 /// A number, or `NaN` where JSON has null.
-fn or_nan<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
+pub(crate) fn or_nan<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
     Ok(Option::deserialize(from)?.unwrap_or(f64::NAN))
 }

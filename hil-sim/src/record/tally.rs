@@ -12,6 +12,7 @@ use super::{CrossingLine, LogLine, Recording, Report, Summary, Tick, drawn};
 use crate::plant::ledger::Crossing;
 use crate::plant::rig::{Truth, VirtualRig};
 use crate::scenario::Scenario;
+use crate::session::longest_s;
 
 /// Period of a tick, s.
 pub(super) const TICK_S: f64 = 1e-3;
@@ -136,6 +137,7 @@ impl Tally {
             moving_s: self.run_started.map_or(0.0, |from| self.run_ended - from),
             lost: completed.then(|| self.split.lost(cruise_mm_s)),
             total_s,
+            cut_off_s: Some(longest_s(&scenario.rig)).filter(|longest_s| total_s >= *longest_s),
             travel_mm: (truth.position_mm - self.start_mm).abs(),
             gap_ref_mm: self.gap_ref_mm,
             max_gap_mm: if has_gap { worst } else { f64::NAN },
@@ -251,5 +253,25 @@ mod tests {
         assert!(!finish(Some(Direction::Deploy)).completed);
         assert_eq!(finish(Some(Direction::Deploy)).travel_mm, end);
         assert!(!finish(None).completed);
+    }
+    #[test]
+    fn a_run_that_is_cut_off_says_so() {
+        let scenario = Scenario::default();
+        let plant = VirtualRig::new(scenario.plant(), 0.0, 0.0, TICK_S);
+        let cut_off = |passed| {
+            let ended = Ended {
+                target: "sil",
+                scenario: &scenario,
+                plant: &plant,
+                arrived: None,
+                wall_s: 1.0,
+            };
+            let tally = Tally { passed, ..Tally::new(2.5, 0.0) };
+            tally.finish(&ended, true_line).summary
+        };
+        assert_eq!(cut_off(119_999).cut_off_s, None);
+        assert_eq!(cut_off(120_000).cut_off_s, Some(120.0));
+        let said = crate::report::verdict::headline(&cut_off(120_000));
+        assert!(said.starts_with("Did not complete within 120 s: "), "{said}");
     }
 }

@@ -102,7 +102,8 @@ impl<'de> Deserialize<'de> for Tick {
     fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
         let row = serde_json::Value::deserialize(from)?;
         let controller = Controller::deserialize(&row).map_err(D::Error::custom)?;
-        Ok(Self { controller, truth: TrueState::deserialize(&row).ok() })
+        let truth = row.get("position_true_mm").map(|_| TrueState::deserialize(&row));
+        Ok(Self { controller, truth: truth.transpose().map_err(D::Error::custom)? })
     }
 }
 
@@ -343,34 +344,45 @@ impl Controller {
     }
 }
 
-/// The plant's truth at a tick, before it moves.
+/// The plant's truth at a tick, before it moves. A column that another version's log lacks is
+/// `NaN`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TrueState {
     /// Axial position of the wheel centre, mm.
     pub position_true_mm: f64,
     /// Axial speed, mm/s.
+    #[serde(default = "nan")]
     pub speed_true_mm_s: f64,
     /// Radial preload, N.
+    #[serde(default = "nan")]
     pub preload_true_n: f64,
     /// Distance of the wheel centre from the pillar axis, mm.
+    #[serde(default = "nan")]
     pub radius_true_mm: f64,
     /// Largest tread compression, mm.
+    #[serde(default = "nan")]
     pub compression_true_mm: f64,
     /// Clearance between the root of the nearest step and the undeformed wheel
     /// circle, mm; NaN away from a step.
     #[serde(default = "nan")]
     pub root_clearance_mm: f64,
     /// Force of the step's corner and face on the wheel, N.
+    #[serde(default = "nan")]
     pub corner_force_n: f64,
     /// Force of the lower wall on the wheel, N.
+    #[serde(default = "nan")]
     pub floor_force_n: f64,
     /// Friction utilisation, traction over normal force.
+    #[serde(default = "nan")]
     pub utilisation: f64,
     /// Friction left unused: mu minus utilisation.
+    #[serde(default = "nan")]
     pub slip_margin_true: f64,
     /// Gross slip so far, mm.
+    #[serde(default = "nan")]
     pub slip_mm: f64,
     /// Deflection of the arm by its modes, um.
+    #[serde(default = "nan")]
     pub vibration_true_um: f64,
 }
 

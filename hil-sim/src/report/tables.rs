@@ -8,7 +8,7 @@ use crate::table::number;
 use serde_json::Value;
 
 /// A table as HTML, without a head if that is empty; the cells are HTML already.
-pub(super) fn table(class: &str, head: &[String], rows: Vec<Vec<String>>) -> String {
+pub(crate) fn table(class: &str, head: &[String], rows: Vec<Vec<String>>) -> String {
     let cells = |tag: &str, cells: &[String]| -> String {
         let cells: String = cells.iter().map(|cell| format!("<{tag}>{cell}</{tag}>")).collect();
         format!("<tr>{cells}</tr>\n")

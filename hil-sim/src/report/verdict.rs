@@ -139,7 +139,10 @@ pub(crate) fn headline(summary: &Summary) -> String {
             format!("Restarted after {travel}: {cause}")
         }
         (false, None) if !summary.missing.is_empty() => format!("Log ends after {travel}"),
-        (false, None) => format!("Did not complete: {travel}"),
+        (false, None) => {
+            let within = summary.cut_off_s.map(|s| format!(" within {s:.0} s")).unwrap_or_default();
+            format!("Did not complete{within}: {travel}")
+        }
         (false, Some(fault)) => {
             format!("Did not complete: fault {} after {travel}: {}", fault.code, fault.text)
         }

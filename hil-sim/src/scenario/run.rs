@@ -130,7 +130,6 @@ pub enum StepAnomaly {
 
 impl StepAnomaly {
     /// Codes that name it.
-    #[must_use]
     pub const fn codes(&self) -> &'static [u16] {
         match self {
             Self::Early { .. } => &[201, 124],

@@ -30,8 +30,6 @@ pub struct Plot {
     pub title: &'static str,
     /// Name of its axis, with the unit.
     pub y_name: &'static str,
-    /// A level with its name.
-    pub level: Option<(&'static str, f64)>,
 }
 
 /// The picture as SVG; none if no key has numbers.
@@ -68,7 +66,6 @@ pub fn picture(axes: &[Axis], rows: &[Map<String, Value>], plots: &[Plot]) -> Op
             x_name: Some(x_name),
             x: range,
             lines: names.iter().enumerate().map(line).collect(),
-            levels: plot.level.iter().map(|(name, at)| (*name, Look::Limit, *at)).collect(),
             ..Panel::default()
         }
     };

@@ -1,14 +1,14 @@
 //! The campaign of faults at a few instants each: nothing undetected, nothing unsafe, and urgent
 //! faults are found at once. `cargo rig faults` is the complete campaign.
 
-use hil_sim::faults::campaign::{Campaign, Case, MatrixRow, Outcome};
+use hil_sim::faults::campaign::{Case, FaultCampaign, MatrixRow, Outcome};
 use hil_sim::scenario::Scenario;
 use hil_sim::scenario::injection::{Injection, Kind, Target};
 use hil_sim::session::{Options, run};
 
 fn campaign(instants: usize, wanted: impl Fn(&str) -> bool) -> Outcome {
     let cases = Case::all().into_iter().filter(|case| wanted(&case.name())).collect();
-    let campaign = Campaign { scenario: Scenario::default(), instants, cases };
+    let campaign = FaultCampaign { scenario: Scenario::default(), instants, cases };
     campaign.run(&|| {}).expect("a campaign")
 }
 
@@ -124,4 +124,23 @@ fn a_log_without_a_reader_does_not_change_the_run() {
     let (clean, gone) = (run(&clean), run(&gone));
     assert_eq!(clean.summary.trace_digest, gone.summary.trace_digest);
     assert!(gone.stream.len() < clean.stream.len() / 2);
+}
+
+/// A rig of this travel at 5 mm/s.
+fn slow(travel_mm: u32) -> Scenario {
+    let sets = [format!("rig.travel_mm={travel_mm}"), "drive.cruise_speed_mm_s=5".to_owned()];
+    Scenario::default().with(&sets).expect("in range")
+}
+
+#[test]
+fn a_long_travel_at_a_low_speed_is_given_its_time() {
+    // 200 s, and 60 s each way.
+    let steps = ["rig.step_positions_mm=[200, 500, 800]".to_owned()];
+    let long = slow(1000).with(&steps).expect("in range");
+    let summary = run(&long, Options::default()).expect("a run").summary;
+    assert!(summary.completed && summary.duration_s > Some(190.0), "{summary:?}");
+    let cases = Case::all().into_iter().filter(|case| case.name() == "log gone").collect();
+    let campaign = FaultCampaign { scenario: slow(300), instants: 1, cases };
+    let outcome = campaign.run(&|| {}).expect("a campaign");
+    assert_eq!((outcome.undetected, outcome.unheld), (0, 0), "{outcome:#?}");
 }

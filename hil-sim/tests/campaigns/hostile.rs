@@ -5,7 +5,7 @@
 //! Overflow is checked in this build: a sum that wraps by mistake panics.
 
 use super::parity;
-use hil_sim::session::Echo;
+use crate::common::echo::Echo;
 use interstage::model::reduced::{Point, ReducedModel, Scale};
 use interstage::model::{Learned, Plan, PlanRequest, Planner, Review};
 use interstage::rig::Rig;

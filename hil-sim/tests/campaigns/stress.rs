@@ -66,7 +66,7 @@ fn a_crossing_at_resonance_shows_vibration() {
 
 #[test]
 fn the_plant_withstands_the_corners_of_its_ranges() {
-    let report = stress::run(200, 1, &|| {});
+    let Ok(report) = stress::campaign(200, 1).complete(&|| {});
     assert_eq!(report.cases, 200);
     assert!(report.failed.is_empty(), "{:#?}", report.failed);
     // Only impossible cases are refused, each with its parameters and its limit.

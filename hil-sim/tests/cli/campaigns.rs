@@ -1,8 +1,11 @@
-//! `rig montecarlo`, `rig faults`, `rig compare` and `rig envelope`.
+//! `rig montecarlo`, `rig faults`, `rig compare`, `rig envelope`, and the parts of each.
+
+use std::path::Path;
+use std::process::Output;
 
 use serde_json::Value;
 
-use super::{code, good, number, object, refused, rig, rig_in, stdout};
+use super::{code, good, number, object, refused, refused_in, rig, rig_in, stderr, stdout};
 
 fn campaign(more: &[&str]) -> Value {
     good(&[&["montecarlo", "--json"], more].concat())
@@ -96,7 +99,7 @@ fn the_comparison_has_every_strategy_and_the_oracle() {
     let table = rig(&["compare", "-n", "1", "--no-oracle"]);
     let text = stdout(&table);
     assert!(text.contains("reactive") && !text.contains("oracle"), "{text}");
-    assert!(text.contains("command s") && text.lines().all(|line| line.chars().count() <= 100));
+    assert!(text.contains("ratio") && text.lines().all(|line| line.chars().count() <= 100));
 }
 
 #[test]
@@ -132,4 +135,122 @@ fn a_grid_that_is_none_is_refused() {
     for text in ["8", "1x7", "a x b"] {
         refused(&["envelope", "-n", text], &["-n", text, "8x7"]);
     }
+}
+
+/// Runs both halves of a campaign into files, and what one machine prints of it.
+fn halves(at: &Path, command: &[&str]) -> [Output; 2] {
+    let parts = ["1/2", "2/2"].map(|shard| {
+        let output = rig_in(at, &[command, &["--json", "--shard", shard]].concat());
+        let name = format!("{}.json", &shard[..1]);
+        std::fs::write(at.join(&name), &output.stdout).expect("written");
+        name
+    });
+    // In any order, as text and as JSON.
+    [&["merge", &parts[1], &parts[0]][..], &["merge", &parts[0], &parts[1], "--json"]]
+        .map(|merge| rig_in(at, merge))
+}
+
+#[test]
+fn merged_parts_are_what_one_machine_prints_to_the_bit() {
+    for command in [
+        "montecarlo -n 20 --seed 7 --wide",
+        "faults -n 2 --only runaway --only tick",
+        "faults --clean 3",
+        "stress --cases 40",
+        "envelope -n 2x2 --no-files",
+        "sweep --no-files --crossing --method reduced --key speed_mm_s=5,8,9",
+        "compare -n 1 --no-oracle",
+    ] {
+        let directory = tempfile::tempdir().unwrap();
+        let at = directory.path();
+        let command: Vec<&str> = command.split(' ').collect();
+        let [text, json] = halves(at, &command);
+        let whole = rig_in(at, &command);
+        assert_eq!(stdout(&text), stdout(&whole), "{command:?}: {}", stderr(&text));
+        assert_eq!(code(&text), code(&whole), "{command:?}");
+        let whole = rig_in(at, &[&command[..], &["--json"]].concat());
+        assert_eq!(stdout(&json), stdout(&whole), "{command:?}");
+        // The keys of a part are those of the whole, and its lines.
+        let part: Value =
+            serde_json::from_slice(&std::fs::read(at.join("1.json")).unwrap()).unwrap();
+        for key in object(&whole).as_object().unwrap().keys() {
+            assert!(part.get(key).is_some(), "{command:?}: {key}");
+        }
+    }
+}
+
+#[test]
+fn parts_that_do_not_fit_are_refused_and_a_missing_one_is_told() {
+    let directory = tempfile::tempdir().unwrap();
+    let at = directory.path();
+    let run = ["montecarlo", "-n", "3", "--json", "--shard"];
+    for (name, more) in
+        [("a", &["1/3"][..]), ("b", &["2/3"]), ("other", &["2/3", "--set", "plant.mu=1.2"])]
+    {
+        let output = rig_in(at, &[&run[..], more].concat());
+        std::fs::write(at.join(name), &output.stdout).unwrap();
+    }
+    std::fs::write(at.join("none"), "{}").unwrap();
+    refused_in(at, &["merge", "a", "other"], &["other: ", "plant.mu=1.2", "montecarlo -n 3"]);
+    refused_in(at, &["merge", "a", "a"], &["a: case 0", "another part"]);
+    refused_in(at, &["merge", "none"], &["none: no part of a campaign"]);
+    refused_in(at, &["merge", "nowhere"], &["nowhere: "]);
+    let output = rig_in(at, &["merge", "a", "b"]);
+    assert_eq!(code(&output), 1);
+    assert!(stdout(&output).starts_with("Partial: 2 of 3 cases"), "{}", stdout(&output));
+    let output = rig_in(at, &["merge", "a", "b", "--json"]);
+    assert_eq!(object(&output)["partial"], serde_json::json!({ "done": 2, "of": 3 }));
+}
+
+#[test]
+fn a_part_without_a_case_and_seeds_beyond_the_last_are_refused() {
+    refused(&["montecarlo", "-n", "1", "--shard", "2/2"], &["--shard 2/2", "of 1"]);
+    refused(&["faults", "--clean", "1", "--shard", "2/2"], &["--shard 2/2"]);
+    refused(&["faults", "--only", "tick overrun", "-n", "1", "--shard", "2/2"], &["--shard 2/2"]);
+    let last = "9223372036854775807";
+    for verb in [&["montecarlo", "-n", "2"][..], &["compare", "-n", "2"]] {
+        refused(&[verb, &["--seed", last]].concat(), &["run.seed", "9223372036854775805"]);
+    }
+    let faults = ["faults", "-n", "2", "--set", "run.seed=9223372036854775806"];
+    refused(&faults, &["run.seed", "9223372036854775805"]);
+}
+
+#[test]
+fn the_rows_of_a_campaign_are_written_as_a_table() {
+    let directory = tempfile::tempdir().unwrap();
+    let at = directory.path();
+    let tables = ["--table", "runs.csv", "--table", "runs.html"];
+    let output = rig_in(at, &[&["montecarlo", "-n", "2"][..], &tables].concat());
+    assert!(
+        stdout(&output).ends_with("wrote runs.csv\n  wrote runs.html\n"),
+        "{}",
+        stdout(&output)
+    );
+    let csv = std::fs::read_to_string(at.join("runs.csv")).unwrap();
+    assert!(csv.starts_with("seed,completed,duration_s,") && csv.lines().count() == 3, "{csv}");
+    let page = std::fs::read_to_string(at.join("runs.html")).unwrap();
+    assert!(page.contains("<th>worst gap, mm</th>") && page.contains("<td>yes</td>"));
+    refused(&["montecarlo", "-n", "2", "--table", "runs.txt"], &["--table", ".csv or .html"]);
+}
+
+/// Ends a campaign by Ctrl-C once it has begun, as a terminal does.
+#[cfg(unix)]
+#[test]
+fn ctrl_c_keeps_what_is_done_and_says_that_it_is_partial() {
+    let child = std::process::Command::new(env!("CARGO_BIN_EXE_rig"))
+        .args(["montecarlo", "-n", "1000000", "--json"])
+        .stdout(std::process::Stdio::piped())
+        .spawn()
+        .expect("the command starts");
+    std::thread::sleep(std::time::Duration::from_secs(4));
+    let id = child.id().to_string();
+    let interrupted = std::process::Command::new("kill").args(["-INT", &id]).status();
+    assert!(interrupted.expect("kill").success());
+    let output = child.wait_with_output().expect("it ends");
+    assert_eq!(code(&output), 1, "{}", stderr(&output));
+    let found = object(&output);
+    let done = number(&found["partial"], "done");
+    assert!((1.0..1e6).contains(&done) && number(&found["partial"], "of") == 1e6);
+    assert_eq!(number(&found, "runs"), done);
+    assert_eq!(found["campaign"]["lines"].as_array().expect("lines").len() as f64, done);
 }

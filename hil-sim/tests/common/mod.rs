@@ -2,6 +2,7 @@
 
 #![allow(dead_code, reason = "each test file uses its part of this")]
 
+pub(crate) mod echo;
 pub(crate) mod python;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};

@@ -15,7 +15,8 @@ use hil_sim::testing::long;
 fn hidden_parameters_lie_within_their_intervals() {
     let cases = if long() { 100 } else { 10 };
     let mut lines = BTreeMap::<String, Line>::new();
-    for seed in 1..=cases {
+    // The intervals were widened by the rigs of seeds 1 to 10.
+    for seed in 11..=10 + cases {
         hidden::found(seed, |name, of| of(lines.entry(name.to_owned()).or_default()));
     }
     assert_eq!(lines.len(), 17);

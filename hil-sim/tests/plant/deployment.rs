@@ -2,8 +2,9 @@
 
 use hil_sim::plant::balance::Axial;
 use hil_sim::plant::draw::PlantParameters;
-use hil_sim::plant::rig::{Resolution, Truth, VirtualRig};
+use hil_sim::plant::rig::{Drives, Resolution, Truth, VirtualRig};
 use hil_sim::plant::wall::{Step, Wall};
+use hil_sim::scenario::Scenario;
 
 use super::bench::{TICK_S, close, crossed, deploy, fine, ideal, nominal, off, pairs};
 
@@ -150,4 +151,16 @@ fn radial_inertia_may_be_neglected() {
         let force = 1e-3 * most * nominal(preset).mass_kg;
         assert!(force < 0.03 * preload, "{force}");
     }
+}
+
+#[test]
+fn the_screw_of_a_rig_of_high_steps_follows_them_to_the_end() {
+    let mut plant = Scenario::default().plant();
+    let steps = plant.wall.steps().iter().map(|step| Step { height_mm: 16.0, ..*step }).collect();
+    plant.wall = Wall::new(steps);
+    let mut rig = VirtualRig::new(plant, 80.0, 33.0, 1e-3);
+    let releases = Drives { preload: -0.1, preload_on: true, ..Drives::default() };
+    (0..400).for_each(|_| rig.step(&releases, 1e-3).expect("at rest"));
+    let preload_n = rig.truth().preload_n;
+    assert!((30.0..33.0).contains(&preload_n), "{preload_n}");
 }

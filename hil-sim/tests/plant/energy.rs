@@ -1,6 +1,7 @@
 //! The first law over complete climbs and descents.
 
 use hil_sim::plant::draw::PlantParameters;
+use hil_sim::plant::energy::Energy;
 use hil_sim::plant::rig::{Resolution, VirtualRig};
 use hil_sim::scenario::Scenario;
 
@@ -28,7 +29,12 @@ fn missing(plant: PlantParameters, speed: f64, preload: f64, travel: f64, steps:
     assert_eq!(rig.truth().slip_mm, 0.0);
     // On a descent the load drives, and most goes into the worm.
     let released = -(energy.load_mj + energy.preload_mj + energy.arm_mj).min(0.0);
-    energy.missing_mj(&start) / (energy.motor_mj + released)
+    // What the motor's work exceeds the sum of the others by.
+    let total = |e: &Energy| {
+        let lost = e.gear_mj + e.worm_mj + e.creep_mj + e.tread_mj;
+        e.motor_mj - lost - e.load_mj - e.preload_mj - e.arm_mj - e.wound_mj - e.kinetic_mj
+    };
+    (total(energy) - total(&start)) / (energy.motor_mj + released)
 }
 
 fn balances(plant: PlantParameters, speed: f64, preload: f64) {

@@ -32,7 +32,7 @@ fn duration_s(sets: &[&str], direction: Direction) -> f64 {
 
 /// Seeds of the runs that are wrong and do not say so.
 fn unreported(scenario: &Scenario, seeds: &[u64]) -> Vec<u64> {
-    let lines = montecarlo::run(scenario, seeds, &|| {}).expect("runs");
+    let lines = montecarlo::campaign(scenario, seeds.to_vec()).complete(&|| {}).expect("runs");
     lines.iter().filter(|line| line.unreported).map(|line| line.seed).collect()
 }
 

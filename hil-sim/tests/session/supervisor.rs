@@ -3,10 +3,11 @@
 
 use std::collections::BTreeMap;
 
+use crate::common::echo::Echo;
 use hil_sim::plant::rig::VirtualRig;
 use hil_sim::plant::sensors::Sensors;
 use hil_sim::scenario::Scenario;
-use hil_sim::session::{Echo, drives, read};
+use hil_sim::session::{drives, read};
 use interstage::fault::Fault;
 use interstage::model::{Plan, Planner};
 use interstage::sense::raw::{

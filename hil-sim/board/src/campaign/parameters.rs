@@ -98,21 +98,16 @@ pub(super) fn judged(
         finding = Finding::Found;
     }
     Ok(Instant {
-        seed: scenario.run.seed,
         at_s: board.bench.fault_times().struck_s,
-        magnitude: Some(injection.magnitude()),
-        during: "at rest",
         finding,
         code: report.map(|(_, code)| code),
-        restart,
+        restart: restart.map(Into::into),
         // From the start that finds the damage.
         latency_ms: board.parameters.damaged.map(|up| up as f64),
         rest_ms: None,
-        end,
-        peak_preload_n: judge.peak_preload_n,
-        motion_mm: judge.motion_mm,
-        gap_part,
+        end: end.into(),
         harms,
+        ..Instant::judged(scenario, &judge, twin, gap_part)
     })
 }
 

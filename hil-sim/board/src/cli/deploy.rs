@@ -34,15 +34,13 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     if args.hil {
         return in_the_loop(args, &scenario, directory.as_deref());
     }
-    let faults: Result<Vec<_>, _> = args.board_fault.iter().map(|text| text.parse()).collect();
-    let faults = faults.map_err(|error| Failure::input(format!("--board-fault {error}")))?;
     let elf = firmware::image(Profile::Release)?;
     let show = |t_s: f64, line: &Line| {
         if args.log {
             eprintln!("[{t_s:8.3}] {:<5} {}", line.level, line.text);
         }
     };
-    let options = RunOptions { rows: directory.is_some(), faults, wait_states: true };
+    let options = RunOptions { rows: directory.is_some(), wait_states: true };
     let ran = {
         let _progress = (!args.log).then(|| progress::spinner(scenario.run.direction.name()));
         run::run_with(&elf, &scenario, &options, show).map_err(Failure::run)?

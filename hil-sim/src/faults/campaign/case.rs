@@ -71,7 +71,6 @@ const STEP_FAULTS: [StepFault; 5] = [
 
 impl Case {
     /// Every fault of the matrix.
-    #[must_use]
     pub fn all() -> Vec<Self> {
         let injected = CATALOGUE.iter().map(Self::Injected);
         injected.chain(STEP_FAULTS.iter().map(Self::Step)).collect()
@@ -79,7 +78,6 @@ impl Case {
 
     /// Every fault of the matrix on the emulated board: those of software and of hardware. A
     /// model that does not answer is a task that hangs there, and a reset has its own causes.
-    #[must_use]
     pub fn all_on_board() -> Vec<Self> {
         let software =
             CATALOGUE.iter().filter(|e| !matches!(e.target, Target::Model | Target::Reset));
@@ -88,7 +86,6 @@ impl Case {
     }
 
     /// Its name in the matrix.
-    #[must_use]
     pub fn name(&self) -> String {
         match self {
             Self::Injected(entry) => format!("{} {}", entry.target.name(), entry.kind.name()),
@@ -103,7 +100,6 @@ impl Case {
 
     /// Whether the name of the fault contains one of these, or there are none; `reset` is
     /// every reset.
-    #[must_use]
     pub fn is_one_of(&self, wanted: &[String]) -> bool {
         wanted.is_empty()
             || wanted
@@ -112,7 +108,6 @@ impl Case {
     }
 
     /// What happens, in words.
-    #[must_use]
     pub fn text(&self) -> String {
         match self {
             Self::Injected(entry) if entry.unit.is_empty() => entry.text.to_owned(),

@@ -1,13 +1,14 @@
 //! The outcome of a campaign: a row for each fault.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::{Case, Finding, Instant};
 
 /// Median and worst of a figure over the instants.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MedianAndWorst {
     /// Median.
     pub median: f64,
@@ -25,7 +26,7 @@ impl MedianAndWorst {
 }
 
 /// A fault at all its instants.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct MatrixRow {
     /// The fault.
     pub fault: String,
@@ -36,8 +37,8 @@ pub struct MatrixRow {
     /// Every code that it was reported by, with how often.
     pub codes: BTreeMap<u16, usize>,
     /// Restarts of the controller that it was reported by, with how often.
-    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
-    pub restarts: BTreeMap<&'static str, usize>,
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub restarts: BTreeMap<Cow<'static, str>, usize>,
     /// Whether at every instant it was reported or tolerated.
     pub detected: bool,
     /// Worst time from fault to report, ms; none if nothing was reported.
@@ -62,7 +63,7 @@ pub struct MatrixRow {
     #[serde(rename = "unsafe")]
     pub unheld: usize,
     /// Ends of the runs and how often each occurred.
-    pub ends: BTreeMap<&'static str, usize>,
+    pub ends: BTreeMap<Cow<'static, str>, usize>,
     /// Largest preload, N.
     pub worst_preload_n: f64,
     /// Longest distance moved uncommanded, mm.
@@ -73,13 +74,11 @@ pub struct MatrixRow {
 
 impl MatrixRow {
     /// The most frequent restart of the controller.
-    #[must_use]
-    pub fn restarted(&self) -> Option<&'static str> {
-        most_frequent(&self.restarts)
+    pub fn restarted(&self) -> Option<&str> {
+        most_frequent(&self.restarts).map(AsRef::as_ref)
     }
 
     /// The row of a fault.
-    #[must_use]
     pub fn of(case: &Case, instants: &[Instant]) -> Self {
         let count = |finding| instants.iter().filter(|i| i.finding == finding).count();
         let codes = counts(instants.iter().filter_map(|i| i.code));
@@ -90,9 +89,9 @@ impl MatrixRow {
         Self {
             fault: case.name(),
             text: case.text(),
-            code: most_frequent(&codes),
+            code: most_frequent(&codes).copied(),
             codes,
-            restarts: counts(instants.iter().filter_map(|i| i.restart)),
+            restarts: counts(instants.iter().filter_map(|i| i.restart.clone())),
             detected: count(Finding::Undetected) == 0,
             latency_ms: latency.map(|l| l.worst),
             latency_median_ms: latency.map(|l| l.median),
@@ -104,7 +103,7 @@ impl MatrixRow {
             tolerated: count(Finding::Tolerated),
             undetected: count(Finding::Undetected),
             unheld,
-            ends: counts(instants.iter().map(|i| i.end)),
+            ends: counts(instants.iter().map(|i| i.end.clone())),
             worst_preload_n: instants.iter().map(|i| i.peak_preload_n).fold(0.0, f64::max),
             worst_motion_mm: instants.iter().map(|i| i.motion_mm).fold(0.0, f64::max),
             failures,
@@ -119,8 +118,8 @@ fn counts<T: Ord>(values: impl Iterator<Item = T>) -> BTreeMap<T, usize> {
     counts
 }
 
-fn most_frequent<T: Copy>(counts: &BTreeMap<T, usize>) -> Option<T> {
-    counts.iter().max_by_key(|(_, times)| **times).map(|(value, _)| *value)
+fn most_frequent<T>(counts: &BTreeMap<T, usize>) -> Option<&T> {
+    counts.iter().max_by_key(|(_, times)| **times).map(|(value, _)| value)
 }
 
 /// A complete campaign.
@@ -143,7 +142,6 @@ pub struct Outcome {
 
 impl Outcome {
     /// The outcome of these rows.
-    #[must_use]
     pub fn of(target: &'static str, matrix: Vec<MatrixRow>, instants: usize) -> Self {
         let otherwise = matrix.iter().map(|line| line.otherwise).sum();
         let undetected = matrix.iter().map(|line| line.undetected).sum();
@@ -152,7 +150,6 @@ impl Outcome {
     }
 
     /// Whether every fault was found or tolerated and every bound kept.
-    #[must_use]
     pub const fn is_good(&self) -> bool {
         self.undetected == 0 && self.unheld == 0
     }

@@ -8,7 +8,7 @@ use interstage::units::Direction;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
-use super::LONGEST_S;
+use super::longest_s;
 use super::operator::Operator;
 use crate::scenario::Scenario;
 use crate::session::{Options, RunError, Session};
@@ -34,7 +34,8 @@ impl Twin {
         let mut session = Session::new(scenario, Options::default())?;
         let mut operator = Operator::default();
         let mut twin = Self::new(scenario)?;
-        while session.time_s() < LONGEST_S {
+        let longest_s = longest_s(&scenario.rig);
+        while session.time_s() < longest_s {
             let t_s = session.time_s();
             let command = operator.command(session.mode());
             if !operator.started() {

@@ -25,7 +25,6 @@ impl VirtualRig {
     }
 
     /// Traction of the tread, N: the load of the drive.
-    #[must_use]
     pub fn traction_n(&self) -> f64 {
         self.truth.utilisation * self.forces.0
     }

@@ -20,7 +20,6 @@ pub const PHASES: [Phase; 3] = [Phase::Smooth, Phase::Awake, Phase::Crossing];
 
 impl Phase {
     /// Name for tables.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::Smooth => "smooth wall",
@@ -45,7 +44,6 @@ pub struct PhaseWork {
 
 impl VirtualRig {
     /// What the contact did in the last step.
-    #[must_use]
     pub fn phase(&self) -> Phase {
         self.phase
     }
@@ -64,7 +62,6 @@ impl VirtualRig {
     }
 
     /// What has been computed so far in each phase, in the order of [`PHASES`].
-    #[must_use]
     pub fn phases(&self) -> &[PhaseWork; PHASES.len()] {
         &self.phases
     }

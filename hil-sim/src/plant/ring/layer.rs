@@ -19,8 +19,8 @@ use super::complementarity::Complementarity;
 const DEEP: f64 = 40.0;
 
 /// Gap at which the shear modulus is calibrated, mm: that of the relaxed ring at the 4 mm
-/// step under 100 N, as for the finite elements.
-const CALIBRATED_AT: Release = Release { step_mm: 4.0, gap_mm: 1.487 };
+/// step under 100 N, as for the finite elements. Of another wheel both go with its radius.
+const CALIBRATED_AT: Release = Release { radius_mm: 25.0, step_mm: 4.0, gap_mm: 1.487 };
 
 /// Elements around the rim for the calibration.
 const FINE: usize = 2880;
@@ -32,6 +32,7 @@ pub(super) const STIFFENING: f64 = 1.0 / 3.0;
 
 /// A wheel pushed at a step, its lower wall just touched.
 struct Release {
+    radius_mm: f64,
     step_mm: f64,
     gap_mm: f64,
 }
@@ -140,13 +141,14 @@ pub(in crate::plant) fn modulus_mm(parameters: &RingParameters) -> f64 {
     // The elements that face the step ahead and the wall under the centre.
     let angles: Vec<f64> = (-200..=600).map(|i| f64::from(i) * pitch).collect();
     let mut contact = Complementarity::new(&compliance(radius, thickness, FINE), angles.len());
-    let Release { step_mm, gap_mm } = CALIBRATED_AT;
+    let like = radius / CALIBRATED_AT.radius_mm;
+    let (step_mm, gap_mm) = (like * CALIBRATED_AT.step_mm, like * CALIBRATED_AT.gap_mm);
     let step = |height: f64, angle: f64| {
         let over = (radius + gap_mm).powi(2) - height * height;
         let face = radius - over.max(0.0).sqrt() / angle.sin().max(1e-9);
         face.min(radius - (height - step_mm) / angle.cos())
     };
-    let (mut low, mut high) = (radius - 0.5, radius + gap_mm);
+    let (mut low, mut high) = (radius - 0.5 * like, radius + gap_mm);
     let mut active = vec![false; angles.len()];
     for _ in 0..40 {
         let height = 0.5 * (low + high);
@@ -221,5 +223,17 @@ mod tests {
             let got = rubber.k_inf * modulus_mm(&rubber);
             assert!((got / modulus - 1.0).abs() < 0.03, "{thickness}: {got} {modulus}");
         }
+    }
+    #[test]
+    fn a_wheel_twice_as_large_in_everything_is_calibrated_alike() {
+        let of = |like: f64| {
+            let rubber = RingParameters::of(&Rig::fe(), 4);
+            modulus_mm(&RingParameters {
+                radius_mm: like * rubber.radius_mm,
+                tread_thickness_mm: like * 8.0,
+                ..rubber
+            })
+        };
+        assert!((of(2.0) / (2.0 * of(1.0)) - 1.0).abs() < 1e-9);
     }
 }

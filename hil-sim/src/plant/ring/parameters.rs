@@ -26,7 +26,6 @@ pub struct RingParameters {
 
 impl RingParameters {
     /// Wheel and rubber of a rig, by this many elements.
-    #[must_use]
     pub fn of(rig: &Rig, elements: usize) -> Self {
         // Pa/m to N/mm^3.
         let k_inf = rig.tread.k_inf_pa_per_m * 1e-9;
@@ -43,19 +42,16 @@ impl RingParameters {
     }
 
     /// Whether the elements are coupled.
-    #[must_use]
     pub fn is_coupled(&self) -> bool {
         self.tread_thickness_mm > 0.0
     }
 
     /// Whether the rubber relaxes twice.
-    #[must_use]
     pub fn relaxes_twice(&self) -> bool {
         self.second_relaxation > 1.0
     }
 
     /// Relaxation times, the faster one first, s.
-    #[must_use]
     pub fn relaxations_s(&self) -> [f64; 2] {
         [self.tau_s / self.second_relaxation, self.tau_s * self.second_relaxation]
     }

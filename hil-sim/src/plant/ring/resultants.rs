@@ -30,7 +30,6 @@ pub struct Contact {
 
 impl Contact {
     /// The contact a little higher up, by its derivatives, its parts as the whole.
-    #[must_use]
     pub fn moved(self, change_mm: f64) -> Self {
         let cosine_n = self.cosine_n + self.slope.0 * change_mm;
         let part = cosine_n / self.cosine_n;
@@ -47,7 +46,6 @@ impl Contact {
     }
 
     /// Magnitude of the step's force on the wheel, N.
-    #[must_use]
     pub fn step_force_n(&self) -> f64 {
         self.step_cosine_n.hypot(self.step_sine_n)
     }

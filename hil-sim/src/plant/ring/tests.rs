@@ -1,6 +1,7 @@
 use proptest::prelude::*;
 
-use super::super::wall::{Facet, Step, Wall};
+use super::super::wall::tests::Facet;
+use super::super::wall::{Step, Wall};
 use super::*;
 
 fn rubber(elements: usize) -> RingParameters {

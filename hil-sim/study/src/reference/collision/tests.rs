@@ -354,7 +354,15 @@ proptest! {
         let h = 2.4 / f64::from(count);
         for i in 0..count {
             let psi = -1.2 + h * (f64::from(i) + 0.5);
-            let depth = 25.0 - wall.ray(y, psi.sin(), psi.cos()).0;
+            // To the floor, to the face ahead, or to the top above it.
+            let (sin, cos) = psi.sin_cos();
+            let (ahead, over) = (wall.ahead_mm * cos, y - wall.rise_mm);
+            let distance = match (y * sin > ahead, over * sin > ahead) {
+                (false, _) => y / cos,
+                (true, false) => wall.ahead_mm / sin,
+                (true, true) => over / cos,
+            };
+            let depth = 25.0 - distance;
             if depth > 0.0 {
                 radial += depth * psi.cos();
                 axial += depth * psi.sin();

@@ -7,11 +7,11 @@ use interstage::units::MotorCommand;
 
 /// Two bridges that follow their command, without noise.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Echo([Lag; 2]);
+pub(crate) struct Echo([Lag; 2]);
 
 impl Echo {
     /// Their readback a tick after this output.
-    pub fn read(&mut self, output: &Output) -> BridgeCodes {
+    pub(crate) fn read(&mut self, output: &Output) -> BridgeCodes {
         let [drive, pretightener] = &mut self.0;
         let code = |lag: &mut Lag, command: MotorCommand| {
             let duty = if command.enable { command.duty.to_bits() } else { 0 };

@@ -19,16 +19,10 @@ impl Shard {
     /// All of the campaign.
     pub const ALL: Self = Self { index: 1, of: 1 };
 
-    /// Whether the item at this place, counted from 0, belongs to this part: every n-th does.
-    #[must_use]
-    pub const fn has(self, place: u64) -> bool {
-        place % self.of == self.index - 1
-    }
-
-    /// Every n-th of the `count` seeds that follow `base`: the parts together are all seeds.
-    #[must_use]
-    pub fn seeds(self, base: u64, count: u64) -> Vec<u64> {
-        (0..count).filter(|offset| self.has(*offset)).map(|offset| base + 1 + offset).collect()
+    /// The places of a campaign of `count` cases that belong to this part: every n-th does, so
+    /// that the parts together are all.
+    pub fn places(self, count: usize) -> Vec<usize> {
+        (0..count).filter(|place| *place as u64 % self.of == self.index - 1).collect()
     }
 }
 
@@ -54,15 +48,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_parts_together_are_all_seeds() {
+    fn the_parts_together_are_all_places() {
         for of in 1..=7 {
-            let mut seeds: Vec<u64> = (1..=of)
-                .flat_map(|index| format!("{index}/{of}").parse::<Shard>().unwrap().seeds(10, 5))
+            let mut places: Vec<usize> = (1..=of)
+                .flat_map(|index| format!("{index}/{of}").parse::<Shard>().unwrap().places(5))
                 .collect();
-            seeds.sort_unstable();
-            assert_eq!(seeds, [11, 12, 13, 14, 15], "{of}");
+            places.sort_unstable();
+            assert_eq!(places, [0, 1, 2, 3, 4], "{of}");
         }
-        assert_eq!(Shard::ALL.seeds(0, 3), [1, 2, 3]);
     }
 
     #[test]
