@@ -33,8 +33,8 @@ pub fn result(
 /// The files that were written: a line a file, or one for a folder. Paths are not wrapped, so that
 /// they can be copied.
 pub fn wrote(files: &[PathBuf]) -> String {
-    let folder = files.first().and_then(|file| file.parent()).filter(|_| files.len() > 1);
-    if let Some(folder) = folder
+    let folder = files.first().and_then(|file| file.parent());
+    if let Some(folder) = folder.filter(|folder| files.len() > 1 && *folder != Path::new(""))
         && files.iter().all(|file| file.parent() == Some(folder))
     {
         let names = files.iter().filter_map(|file| file.file_name()).map(|n| n.to_string_lossy());
