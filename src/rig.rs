@@ -10,7 +10,9 @@ mod presets;
 mod validate;
 
 pub use abilities::OVERPRESSURE_PART;
-pub(crate) use abilities::{CLIMB_PART, SHORT_PART, START_LAG_MM};
+pub(crate) use abilities::{
+    CLIMB_PART, CROSSOVER_RAD_S, MOST_ERROR_MM_S, PROPORTIONAL, SHORT_PART, START_LAG_MM,
+};
 pub use validate::{Bound, RigError};
 
 /// Most steps a step table may hold.
@@ -200,8 +202,7 @@ pub struct ControlSettings {
     /// Part of the reference gap that the schedule aims below it, relative, to leave
     /// room for model error and tolerance.
     pub gap_reserve: f64,
-    /// Friction utilisation that the schedule leaves unused, absolute. Chosen: the reduced
-    /// model reads the need up to 0.06 too low.
+    /// Friction utilisation that the schedule leaves unused, absolute. Chosen.
     pub slip_margin: f64,
     /// Largest deviation of the stiffness estimate below nominal, relative; above it four times
     /// as much, which only makes the crossings slower.
