@@ -10,7 +10,9 @@ mod presets;
 mod validate;
 
 pub use abilities::OVERPRESSURE_PART;
-pub(crate) use abilities::{CLIMB_PART, SHORT_PART, START_LAG_MM};
+pub(crate) use abilities::{
+    CLIMB_PART, CROSSOVER_RAD_S, MOST_ERROR_MM_S, PROPORTIONAL, SHORT_PART, START_LAG_MM,
+};
 pub use validate::{Bound, RigError};
 
 /// Most steps a step table may hold.

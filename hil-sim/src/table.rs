@@ -46,6 +46,13 @@ pub fn label(value: f64, decimals: usize) -> String {
     }
 }
 
+/// `value` with `decimals` and its sign; without one where it rounds to zero.
+pub fn signed(value: f64, decimals: usize) -> String {
+    let text = label(value, decimals);
+    let zero = text.trim_start_matches(['0', '.']).is_empty();
+    if zero || text.starts_with('-') { text } else { format!("+{text}") }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -54,5 +61,7 @@ mod tests {
     fn nothing_is_minus_zero() {
         let shown = [-0.0, -0.004, -0.006, 0.0, f64::NAN].map(|value| number(value, 2));
         assert_eq!(shown, ["0.00", "0.00", "-0.01", "0.00", "-"]);
+        let shown = [-0.04, 0.04, -0.06, 0.06].map(|value| signed(value, 1));
+        assert_eq!(shown, ["0.0", "0.0", "-0.1", "+0.1"]);
     }
 }

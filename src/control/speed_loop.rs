@@ -3,18 +3,12 @@
 #![deny(clippy::float_arithmetic)]
 
 use crate::numeric::{between, checked};
-use crate::rig::{Rig, RigError};
+use crate::rig::{CROSSOVER_RAD_S, MOST_ERROR_MM_S, PROPORTIONAL, Rig, RigError};
 use crate::units::{Duty, MillimetresPerSecond, Newtons, Q16, Ratio, Travel, per_tick, q16};
 
-/// Crossover of the integral part, rad/s: a third of the speed observer's bandwidth.
-pub(crate) const CROSSOVER_RAD_S: f64 = 20.0;
-/// Proportional part, as a fraction of the inverse motor gain.
-pub(crate) const PROPORTIONAL: f64 = 0.3;
 /// Largest error that is integrated, mm/s: a wheel that no longer answers must not wind
 /// the drive up before it is noticed.
-const MOST_ERROR: MillimetresPerSecond = q16(4_000_000);
-/// The same, mm/s.
-pub(crate) const MOST_ERROR_MM_S: f64 = 4.0;
+const MOST_ERROR: MillimetresPerSecond = q16(MOST_ERROR_MM_S as i64 * 1_000_000);
 /// Full duty.
 const FULL: Ratio = q16(1_000_000);
 /// Most that the integral part may contribute, duty.

@@ -1,7 +1,11 @@
 //! Requests of the tick to the model task, and its answers.
 
 use crate::fault::Limit;
-use crate::units::{Direction, Millimetres, MillimetresPerSecond, Newtons, Ratio, Seconds};
+use crate::units::{Direction, Millimetres, MillimetresPerSecond, Newtons, Ratio, Seconds, q16};
+
+/// One sigma of the logarithm of the stiffness of a tread as known: stiffness 4 %, stiffening 3 %
+/// and relaxation time 5 % off.
+pub(super) const KNOWN_DEVIATION: Ratio = q16(50_000);
 
 /// How preload and speed are chosen. The product is [`Strategy::Scheduled`]; the others are for
 /// comparison.
@@ -102,7 +106,7 @@ impl Default for Learned {
     fn default() -> Self {
         Self {
             scale: Ratio::ONE,
-            deviation: super::planner::KNOWN_DEVIATION,
+            deviation: KNOWN_DEVIATION,
             unknown: false,
             reserve: Ratio::ONE,
             extra_load: Newtons::ZERO,

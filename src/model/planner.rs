@@ -10,7 +10,9 @@ pub use approach::KNOWN_SCALE;
 
 use super::dip::Dip;
 use super::guard::Guard;
-use super::plan::{Approach, Learned, LimitedBy, Outcome, Plan, PlanRequest, Review, Strategy};
+use super::plan::{
+    Approach, KNOWN_DEVIATION, Learned, LimitedBy, Outcome, Plan, PlanRequest, Review, Strategy,
+};
 use super::reduced::{Point, ReducedModel, Scale};
 use super::timing::Timing;
 use crate::fault::Limit;
@@ -20,10 +22,8 @@ use crate::units::{
     Direction, Millimetres, MillimetresPerSecond, Newtons, Q16, Ratio, Seconds, q16,
 };
 
-/// One sigma of the logarithm of the stiffness of a tread as known: stiffness 4 %, stiffening 3 %
-/// and relaxation time 5 % off.
-pub const KNOWN_DEVIATION: Ratio = q16(50_000);
-/// The same of what the tread shows before the first crossing if it is not as known.
+/// One sigma of the logarithm of the stiffness of a tread that has shown before the first crossing
+/// that it is not as known.
 pub const SHOWN_DEVIATION: Ratio = q16(240_000);
 /// Variance of a measured stiffness of a tread that is not as known, 0.2 squared: at the next speed
 /// its gap is another by 5 to 6 %, its stiffness by three to four times that.

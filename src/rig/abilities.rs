@@ -1,8 +1,14 @@
 //! What sensors, pre-tightener and drive of a rig can do.
 
 use super::{Bound, Rig, RigError};
-use crate::control::speed_loop::{CROSSOVER_RAD_S, MOST_ERROR_MM_S, PROPORTIONAL};
 use crate::sense::analog::{BROKEN_ABOVE, FULL_AT, ZERO_AT};
+
+/// Crossover of the speed loop's integral part, rad/s: a third of the speed observer's bandwidth.
+pub(crate) const CROSSOVER_RAD_S: f64 = 20.0;
+/// Its proportional part, as a fraction of the inverse motor gain.
+pub(crate) const PROPORTIONAL: f64 = 0.3;
+/// Largest error that it integrates, mm/s.
+pub(crate) const MOST_ERROR_MM_S: f64 = 4.0;
 
 /// Part of the cruise preload by which a preload is short.
 pub(crate) const SHORT_PART: f64 = 0.1;

@@ -59,6 +59,11 @@ pub struct RunArgs {
     #[arg(long, value_name = "NAME", value_parser = PossibleValuesParser::new(ControllerKind::NAMES))]
     controller: Option<String>,
 
+    /// A fault and its onset in seconds from boot, as in supply.weak@2, in place of the scenario's
+    /// `run.faults`, which can say more; may be repeated.
+    #[arg(long, value_name = "TARGET.KIND@S", visible_alias = "board-fault")]
+    fault: Vec<String>,
+
     /// Draws by the seed, too, what the controller is not told: all of `mismatch.*` within
     /// its wide range.
     #[arg(long)]
@@ -105,13 +110,29 @@ impl RunArgs {
         if let Some(seed) = self.seed {
             sets.push(format!("run.seed={seed}"));
         }
+        let faults: Result<Vec<_>, _> = self.fault.iter().map(|text| entry_of(text)).collect();
+        if !self.fault.is_empty() {
+            sets.push(format!("run.faults=[{}]", faults?.join(",")));
+        }
         self.scenario.resolve_with(&sets)
     }
+}
+
+/// The entry of `run.faults` that a text of `--fault` stands for.
+fn entry_of(text: &str) -> Result<String, Failure> {
+    let parts = text.split_once('@').and_then(|(fault, at)| Some((fault.split_once('.')?, at)));
+    let at = parts.and_then(|(_, at)| at.parse::<f64>().ok()).filter(|at| at.is_finite());
+    let (Some(((target, kind), _)), Some(at)) = (parts, at) else {
+        let error = format!("--fault {text}: expected TARGET.KIND@SECONDS, as in supply.weak@2");
+        return Err(Failure::input(error));
+    };
+    Ok(format!("{{target={target:?},kind={kind:?},at_s={at:?}}}"))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scenario::injection::{Kind, Target};
     use crate::scenario::{Direction, MismatchDraw};
 
     #[test]
@@ -127,6 +148,7 @@ mod tests {
             adversarial: false,
             controller: Some("limit".into()),
             seed: Some(5),
+            fault: vec!["supply.weak@2".into(), "encoder-line-b.off@5.5".into()],
         };
         let scenario = args.resolve().unwrap();
         assert_eq!(scenario.preset, "fe");
@@ -135,5 +157,23 @@ mod tests {
         assert_eq!(scenario.run.direction, Direction::Retract);
         assert_eq!(scenario.run.controller, ControllerKind::Limit);
         assert_eq!(scenario.run.mismatch, MismatchDraw::Wide);
+        let faults = scenario.run.faults.iter().map(|fault| (fault.target, fault.kind, fault.at_s));
+        let expected =
+            [(Target::Supply, Kind::Weak, Some(2.0)), (Target::EncoderLineB, Kind::Off, Some(5.5))];
+        assert_eq!(faults.collect::<Vec<_>>(), expected);
+    }
+
+    #[test]
+    fn a_fault_that_cannot_be_read_is_named() {
+        for text in ["supply-dip@2", "supply.weak", "supply.weak@soon", "supply.weak@inf", "@2"] {
+            let args = RunArgs { fault: vec![text.into()], ..RunArgs::default() };
+            let error = args.resolve().unwrap_err().to_string();
+            assert!(
+                error.starts_with(&format!("--fault {text}: expected TARGET.KIND@S")),
+                "{error}"
+            );
+        }
+        let args = RunArgs { fault: vec!["suply.weak@2".into()], ..RunArgs::default() };
+        assert!(args.resolve().unwrap_err().to_string().contains("run.faults[1].target"));
     }
 }

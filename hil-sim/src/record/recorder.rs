@@ -1,7 +1,6 @@
 //! Records a run as it goes on.
 
 use interstage::model::LimitedBy;
-use interstage::restart::Restart;
 use interstage::supervise::{Mode, ServiceDuties};
 use interstage::tick::{CrossingRecord, Entry, Event, Telemetry};
 use interstage::units::{Direction, Duty, Q16};
@@ -117,11 +116,6 @@ pub(super) fn reported(t_s: f64, event: &Event) -> Option<(bool, Report)> {
         _ => return None,
     };
     Some((latched, Report { t_s, code, text: text.to_owned() }))
-}
-
-/// What restarted the target, and what it did before.
-pub(super) fn restart_words(restart: Restart) -> String {
-    restart.to_string().replacen("started: ", "", 1)
 }
 
 /// An event as one line of text.

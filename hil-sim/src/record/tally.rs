@@ -5,7 +5,6 @@ use interstage::restart::Restart;
 use interstage::units::Direction;
 use sha2::{Digest, Sha256};
 
-use super::recorder::restart_words;
 use super::tick::MOVES;
 use super::time_lost::TimeSplit;
 use super::{CrossingLine, LogLine, Recording, Report, Summary, Tick, drawn};
@@ -187,6 +186,11 @@ pub(super) fn true_line(crossing: &Crossing) -> CrossingLine {
     }
 }
 
+/// What restarted the target, and what it did before.
+pub(super) fn restart_words(restart: Restart) -> String {
+    restart.to_string().replacen("started: ", "", 1)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -254,6 +258,7 @@ mod tests {
         assert_eq!(finish(Some(Direction::Deploy)).travel_mm, end);
         assert!(!finish(None).completed);
     }
+
     #[test]
     fn a_run_that_is_cut_off_says_so() {
         let scenario = Scenario::default();

@@ -3,6 +3,7 @@
 
 use super::scene::{Event, Geometry, Scene};
 use super::tables::table;
+use super::verdict::GAP_TOLERANCE;
 use crate::table::number;
 
 /// The animation's controls and pictures, hidden until the script runs.
@@ -49,7 +50,10 @@ Rubber needs time to yield: the faster the crossing, the stiffer the tread and t
 More preload presses the tread deeper into the corner and closes the gap again, and it gives the \
 wheel more friction. {did}{}",
         if scene.gap_ref_mm > 0.0 {
-            format!(" The gap must not exceed its reference of {:.2} mm.", scene.gap_ref_mm)
+            let (reference, most) = (scene.gap_ref_mm, 100.0 * GAP_TOLERANCE);
+            format!(
+                " The gap should be at most {most:.0} % over its reference of {reference:.2} mm."
+            )
         } else {
             String::new()
         }

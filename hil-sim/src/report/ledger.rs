@@ -3,6 +3,7 @@
 use interstage::model::LimitedBy;
 
 use crate::record::CrossingLine;
+use crate::table::signed;
 
 /// The true value that a column is compared with, and the error as text.
 type Truth = (fn(&CrossingLine) -> f64, fn(f64, f64) -> String);
@@ -68,9 +69,9 @@ pub(crate) fn slowed_by(line: &CrossingLine) -> &'static str {
 }
 
 fn gap_error(error: f64, truth: f64) -> String {
-    format!("{:+.0} µm, {:+.1} %", 1e3 * error, 100.0 * error / truth)
+    format!("{} µm, {} %", signed(1e3 * error, 0), signed(100.0 * error / truth, 1))
 }
 
 fn step_error(error: f64, _: f64) -> String {
-    format!("{:+.0} µm", 1e3 * error)
+    format!("{} µm", signed(1e3 * error, 0))
 }

@@ -1,10 +1,10 @@
 //! From a rig to the planner's machine units, once at start.
 
-use super::{KNOWN_DEVIATION, Planner};
+use super::Planner;
 use crate::model::dip::Dip;
 use crate::model::formula::Formula;
 use crate::model::guard::Guard;
-use crate::model::plan::Strategy;
+use crate::model::plan::{KNOWN_DEVIATION, Strategy};
 use crate::model::reduced::{ReducedModel, Scale};
 use crate::model::timing::Timing;
 use crate::numeric::checked;
