@@ -56,6 +56,8 @@ pub struct Estimator {
     watch: CrossingWatch,
     tread: Tread,
     steps: Steps,
+    /// Tread in a stride of the history, mm.
+    stride: Millimetres,
     /// Low-pass of the preload as the tread's memory makes it.
     memory: LowPass,
     /// Wheel travel on a corner beyond which the wheel slips, mm.
@@ -77,6 +79,7 @@ impl Estimator {
             watch: CrossingWatch::try_build(rig)?,
             tread: Tread::try_build(rig)?,
             steps: Steps::try_build(rig)?,
+            stride: crate::model::tread::Tread::try_build(rig)?.stride(),
             memory: LowPass::build(MEMORY_PART * rig.tread.tau_s),
             corner_travel: checked(
                 "rig.wheel_radius_mm",

@@ -8,7 +8,7 @@
 //! 2. [`estimate`]: position between the steps, contact stage, and the gap of a crossing.
 //! 3. [`supervise`]: the operator's commands, modes, faults and limits, by one transition table.
 //! 4. [`control`]: the schedule of speed and preload, then the loops that follow it. What a
-//!    crossing needs comes from the reduced [`model`], outside the tick.
+//!    crossing needs comes from the [`model`], outside the tick.
 //! 5. [`tick::Output`]: the commands of both bridges, and a row for the [`log`].
 //!
 //! A tick is fixed point, without allocation and without waiting, and time is an argument. The async

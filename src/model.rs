@@ -1,18 +1,16 @@
-//! The reduced collision-vibration model and the schedule made from it.
+//! The tread, rolled out, and the schedule made from it.
 
-pub mod constants;
+pub mod approach;
 pub mod corner_profile;
-pub mod dip;
-pub mod effective_stiffness;
-pub mod formula;
 pub mod guard;
-pub mod impact;
+pub mod history;
 mod plan;
 pub mod planner;
-pub mod reduced;
+pub mod profile;
 pub mod rollout;
 pub mod timing;
 pub mod tread;
 
-pub use plan::{Approach, Learned, LimitedBy, Outcome, Plan, PlanRequest, Review, Strategy};
+pub use approach::Approach;
+pub use plan::{Learned, LimitedBy, Outcome, Plan, PlanRequest, Review, Strategy};
 pub use planner::Planner;

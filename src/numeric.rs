@@ -13,11 +13,11 @@ mod table;
 
 pub use build::{checked, cosine_of_turns};
 pub use divide::{Divisor, divide, part};
-pub use high::{fits, fits_with_slope, high};
-pub(crate) use high::{horner, horner_with_curvature, horner_with_slope};
+pub use high::high;
+pub(crate) use high::horner;
 pub use low_pass::{LowPass, LowPassState};
-pub use quotient::{fraction, part_of_sum, reciprocal_of_normalised};
-pub use roots::{inverse_sqrt_guess, inverse_sqrt_normalised, sqrt, sqrt_fraction};
+pub use quotient::reciprocal_of_normalised;
+pub use roots::sqrt;
 pub use sine::sin_cos;
 pub use table::Table;
 

@@ -202,8 +202,7 @@ pub struct ControlSettings {
     /// Part of the reference gap that the schedule aims below it, relative, to leave
     /// room for model error and tolerance.
     pub gap_reserve: f64,
-    /// Friction utilisation that the schedule leaves unused, absolute. Chosen: the reduced
-    /// model reads the need up to 0.06 too low.
+    /// Friction utilisation that the schedule leaves unused, absolute. Chosen.
     pub slip_margin: f64,
     /// Largest deviation of the stiffness estimate below nominal, relative; above it four times
     /// as much, which only makes the crossings slower.

@@ -14,12 +14,12 @@ mod state;
 mod telemetry;
 
 use crate::control::preload_loop::PreloadLoop;
-use crate::control::profile::Profile;
 use crate::control::schedule::Schedule;
 use crate::control::speed_loop::SpeedLoop;
 use crate::estimate::vibration::VibrationObserver;
 use crate::estimate::{Estimator, Follow};
 use crate::fault::Fault;
+use crate::model::profile::Profile;
 use crate::model::{Plan, PlanRequest};
 use crate::sense::raw::SensorFrame;
 use crate::sense::{SensedState, Senses};

@@ -4,7 +4,7 @@
 mod common;
 
 mod fuzz;
-mod reduced_model;
+mod prescribed_speed;
 mod replay;
 mod tasks_background;
 mod tasks_link;

@@ -1,6 +1,6 @@
 //! What the measurement image is linked with: the sets of parameters of the presets, made
-//! here as for the firmware; and a deeper stack, because the model's image makes its models
-//! itself, for many rigs, in f64.
+//! here as for the firmware; and a deeper stack, because the image makes its tread itself, in
+//! f64.
 
 use std::{env, error::Error, fs, path::PathBuf};
 

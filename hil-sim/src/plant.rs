@@ -1,5 +1,5 @@
 //! The rig as physics, in f64; lengths in mm, forces in N, times in s. It knows
-//! nothing of the controller's reduced model.
+//! nothing of the controller's model.
 
 pub mod actuators;
 pub mod arm;

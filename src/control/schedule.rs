@@ -4,24 +4,19 @@
 
 use crate::estimate::Steps;
 use crate::model::Plan;
+use crate::model::approach::{Begun, Place};
 use crate::model::timing::Timing;
 use crate::numeric::{checked, divide};
 use crate::rig::{Rig, RigError};
 use crate::units::{
-    Direction, Millimetres, MillimetresPerSecond, MillimetresPerSecond2, Newtons, Q16, Ratio,
-    Seconds, q16,
+    Direction, Millimetres, MillimetresPerSecond, MillimetresPerSecond2, Newtons, Q16, Seconds, q16,
 };
 
 /// Short of the wanted preload by no more than this part of the limit, it is reached:
 /// worth 1.2 % of the gap, less than the schedule's reserve.
 const REACHED_PART: Q16 = q16(20_000);
-/// Speed over the slowest one at which the wheel may speed up again.
-const SLOWEST_WITHIN: Ratio = q16(1_100_000);
 /// Time by which braking starts early, for detection, tick and the loop's lag, s.
 const BRAKE_LAG: Seconds = q16(10_000);
-/// Time for which a wheel that is slow stays short of where it would lift off with the preload of
-/// now, s.
-const HELD_FOR: Seconds = q16(100_000);
 /// Distance by which braking for the end starts late, mm: the ticks make the profile's braking
 /// shorter by as much.
 const END_LATE: Millimetres = q16(30_000);
@@ -32,8 +27,6 @@ pub struct Schedule {
     timing: Timing,
     /// Short of the wanted preload by no more than this, it is reached, N.
     reached_within: Newtons,
-    /// Travel of the tread over that of the axle where the lower wall stops carrying.
-    around_corner: Ratio,
 }
 
 /// Where the wheel is on its run.
@@ -51,12 +44,8 @@ pub struct Course {
     pub felt: bool,
     /// The preload is already being raised for this step.
     pub ramping: bool,
-    /// The speed is already being brought down for the window of this step.
-    pub looking: bool,
-    /// The speed is already being brought down for this step.
-    pub braking: bool,
-    /// The wheel already speeds up again for this step.
-    pub released: bool,
+    /// What of the approach has begun.
+    pub begun: Begun,
     /// Speed and acceleration of the profile, along the run, mm/s and mm/s^2.
     pub speed: MillimetresPerSecond,
     /// See `speed`.
@@ -78,12 +67,8 @@ pub struct Targets {
     pub preload: Newtons,
     /// The preload is raised for the step ahead; once so, until the step is behind.
     pub ramping: bool,
-    /// The speed is brought down for the window of the step ahead; likewise.
-    pub looking: bool,
-    /// The speed is brought down for the step ahead; likewise.
-    pub braking: bool,
-    /// The wheel speeds up again on the corner; likewise.
-    pub released: bool,
+    /// What of the approach has begun.
+    pub begun: Begun,
     /// The step ahead already has an effect.
     pub approaching: bool,
     /// The speed is held back because the preload is not reached yet.
@@ -97,10 +82,6 @@ impl Schedule {
         Ok(Self {
             timing: Timing::try_build(rig)?,
             reached_within: checked("preload.limit_n", rig.preload.limit_n)? * REACHED_PART,
-            around_corner: checked(
-                "rig.step_height_mm",
-                0.97 / (1.0 - rig.rig.step_height_mm / rig.rig.wheel_radius_mm),
-            )?,
         })
     }
 
@@ -111,26 +92,11 @@ impl Schedule {
 
     /// What to ask for.
     pub fn targets(&self, steps: &Steps, plan: &Plan, course: &Course) -> Targets {
-        // To where crossing speed and preload must be reached, by the table or the felt corner.
-        let ahead = course.distance.map(|distance| distance - plan.approach.slow_from);
         let within =
             |from: Option<Millimetres>, distance| from.is_some_and(|from| from <= distance);
-        // Out of sight of a step no braking can be due, whatever the speed is doing.
         let sight = self.sight(plan, course);
-        let due = |from: Option<Millimetres>, speed, lag: Seconds| {
-            within(from, sight)
-                && within(from, self.brake_distance(course, speed) + course.speed * lag)
-        };
-        // A wheel that stays slow must be slow in time; of one that speeds up again at once the
-        // slowest place may come later. Around the corner its tread runs farther than the axle.
-        let (felt, lag) = if plan.approach.release_time > Q16::ZERO {
-            (ahead.map(|ahead| ahead * self.around_corner), Q16::ZERO)
-        } else {
-            (ahead, BRAKE_LAG)
-        };
-        let window = course.distance.map(|distance| distance - plan.approach.window_from);
-        let looking = course.looking || course.felt || due(window, plan.approach.window_speed, lag);
-        let braking = course.braking || course.felt && due(felt, plan.approach.slowest_speed, lag);
+        // To where the corner is felt, by the table or the corner itself.
+        let ahead = course.distance.map(|distance| distance - plan.approach.brake_from);
         let earliest = if course.felt { ahead } else { ahead.map(|at| at - steps.tolerance()) };
         let ramping = course.ramping
             || course.critical
@@ -139,59 +105,66 @@ impl Schedule {
                 self.ramp_distance(plan, course.reference.min(plan.cruise_preload)),
             );
         let preload = if ramping { plan.ramp_preload } else { plan.cruise_preload };
-        let mut speed = match (looking, braking) {
-            (_, true) => plan.approach.slowest_speed,
-            (true, false) => plan.approach.window_speed,
-            (false, false) => plan.cruise_speed,
-        };
-        let mut waiting = false;
         // Without look-ahead the preload between the steps is the one to have there.
         let due = if plan.look_ahead { plan.cross_preload } else { plan.cruise_preload };
-        let short = due - course.preload;
-        if let Some(distance) = course.distance
-            && short > self.reached_within
-            // On the edge alone a wheel that goes back cannot wait: its tread sinks in.
-            && !(course.critical && course.direction == Direction::Retract)
-        {
-            // Lift off with the preload, not before it; what is slow lies within that time.
-            let needed = self.timing.ramp(short);
-            let ready_from = plan.approach.ready_from + short * plan.approach.earlier_per_preload;
-            let fast = distance - ready_from.max(plan.approach.slow_from);
-            let slow_distance = (plan.approach.slow_from - plan.approach.ready_from).max(Q16::ZERO);
-            let slow = divide(slow_distance, plan.approach.slowest_speed);
-            let allowed = if fast > Q16::ZERO {
-                if needed > slow { self.arriving_in(needed - slow, fast, course) } else { Q16::MAX }
-            } else {
-                let ready = self.arriving_in(needed.min(HELD_FOR), distance - ready_from, course);
-                let lifting = distance - plan.approach.ready_from;
-                self.arriving_in(needed, lifting, course).min(ready)
+        let missing = due - course.preload;
+        let needed = self.timing.ramp((missing - self.reached_within).max(Q16::ZERO));
+        let mut begun = course.begun;
+        let mut speed = plan.cruise_speed;
+        let mut waiting = false;
+        if let Some(distance) = course.distance {
+            let place = Place {
+                distance,
+                felt: course.felt,
+                speed: course.speed,
+                acceleration: course.acceleration,
+                ready: needed == Q16::ZERO
+                    || !course.preload_late && needed <= plan.approach.release_time,
             };
-            if allowed < speed {
-                speed = allowed;
+            // Out of sight of a step no braking can be due, whatever the speed is doing.
+            let seen = begun.looking || distance - plan.approach.window_from <= sight;
+            if seen || course.felt {
+                speed = plan.approach.speed(&mut begun, &place, &self.timing, plan.cruise_speed);
+            }
+            // On the edge alone a wheel that goes back cannot wait: its tread sinks in.
+            let waits = course.felt || course.preload_late;
+            let sinks = course.critical && course.direction == Direction::Retract;
+            if missing > self.reached_within && waits && !sinks {
+                let allowed = self.until_ready(plan, course, distance, needed);
                 // A preload that rises as planned is not waited for.
                 waiting = allowed < plan.approach.slowest_speed && course.preload_late;
+                if !begun.released {
+                    speed = speed.min(allowed);
+                }
             }
-        }
-        let short = short - self.reached_within;
-        let released = course.released
-            || course.felt
-                && within(course.distance, plan.approach.release_from)
-                && course.speed <= plan.approach.slowest_speed * SLOWEST_WITHIN
-                && (short <= Q16::ZERO
-                    || !course.preload_late
-                        && self.timing.ramp(short) <= plan.approach.release_time);
-        if released {
-            speed = plan.cruise_speed;
         }
         Targets {
             speed: speed.min(self.end_speed(steps, course, sight)),
             preload,
             ramping,
-            looking,
-            braking,
-            released,
-            approaching: looking || ramping,
+            approaching: begun.looking || ramping,
+            begun,
             waiting,
+        }
+    }
+
+    /// Largest speed at which the wheel lifts off with its preload, which needs this time, and not
+    /// before it, mm/s: what is missing where it speeds up again still rises until then.
+    fn until_ready(
+        &self,
+        plan: &Plan,
+        course: &Course,
+        distance: Millimetres,
+        needed: Seconds,
+    ) -> MillimetresPerSecond {
+        let held = needed - plan.approach.release_time;
+        let release = distance - plan.approach.release_from;
+        if held <= Q16::ZERO {
+            Q16::MAX
+        } else if release > Q16::ZERO {
+            self.arriving_in(held, release, course)
+        } else {
+            self.arriving_in(needed, distance - plan.approach.lift, course)
         }
     }
 
@@ -233,13 +206,9 @@ impl Schedule {
         }
     }
 
-    /// Distance in which the profile comes from its speed to `speed`, mm. Acceleration
-    /// still under way is first taken back: until then the speed rises to a peak.
+    /// Distance in which the profile comes from its speed to `speed`, mm.
     fn brake_distance(&self, course: &Course, speed: MillimetresPerSecond) -> Millimetres {
-        let rising = course.acceleration.max(Q16::ZERO);
-        let until_peak = self.timing.until_level(rising);
-        let peak = course.speed + rising * until_peak * q16(500_000);
-        peak * until_peak + self.timing.brake_distance(peak, speed)
+        self.timing.distance_to(course.speed, course.acceleration, speed)
     }
 
     /// Speed towards the end of travel, mm/s: free until braking to rest must begin.
@@ -289,9 +258,7 @@ mod tests {
             critical: false,
             felt: false,
             ramping: false,
-            looking: false,
-            braking: false,
-            released: false,
+            begun: Begun::default(),
             speed: Q16::from_num(speed),
             acceleration: Q16::ZERO,
             reference: Q16::from_num(preload),
@@ -328,20 +295,33 @@ mod tests {
             let looking = schedule.targets(&steps, &plan, &at(plan.approach.window_from, false));
             prop_assert_eq!(looking.speed, plan.approach.window_speed);
             prop_assert_eq!(looking.preload, plan.ramp_preload);
-            prop_assert!(looking.looking && !looking.braking && !looking.waiting);
-            let felt = schedule.targets(&steps, &plan, &at(plan.approach.slow_from, true));
-            prop_assert!(felt.braking && !felt.waiting);
-            // As slow as planned and with its preload it speeds up again before it lifts off.
-            let from = plan.approach.release_from.to_num::<f64>();
-            let there = plan.approach.slow_from.to_num::<f64>() - into < from;
-            prop_assert_eq!(felt.released, there);
-            let speed = if there { plan.cruise_speed } else { plan.approach.slowest_speed };
-            prop_assert_eq!(felt.speed, speed);
-            let fast = Course { speed: q16(20_000_000), ..at(plan.approach.slow_from, true) };
-            let fast = schedule.targets(&steps, &plan, &fast);
-            prop_assert!(!fast.released && fast.speed == plan.approach.slowest_speed);
-            let short = Course { preload: q16(33_300_000), ..at(plan.approach.slow_from, true) };
-            prop_assert!(!schedule.targets(&steps, &plan, &short).released);
+            prop_assert!(looking.begun.looking && !looking.begun.braking && !looking.waiting);
+            let braking = at(plan.approach.brake_from, true);
+            let felt = schedule.targets(&steps, &plan, &Course { speed: q16(20_000_000), ..braking });
+            prop_assert!(felt.begun.braking && !felt.begun.released && !felt.waiting);
+            prop_assert_eq!(felt.speed, plan.approach.slowest_speed.min(plan.cruise_speed));
+        }
+
+        #[test]
+        fn a_wheel_speeds_up_again_where_it_is_slow_and_has_its_preload(
+            back in any::<bool>(),
+            into in 0.0..0.2f64,
+        ) {
+            let (_, schedule, steps, plan) = setting(back);
+            let distance = plan.approach.release_from.to_num::<f64>() - into;
+            let slow = plan.approach.slowest_speed.to_num::<f64>();
+            let standing = plan.cross_preload.to_num::<f64>();
+            let at = Course { felt: true, ..course(&plan, distance, slow, standing) };
+            let released = |course: &Course| {
+                let targets = schedule.targets(&steps, &plan, course);
+                assert!(!targets.begun.released || targets.speed == plan.cruise_speed);
+                targets.begun.released
+            };
+            prop_assert!(released(&at));
+            let fast = Course { speed: plan.cruise_speed + q16(5_000_000), ..at };
+            prop_assert!(!released(&fast));
+            let short = Course { preload: q16(33_300_000), ..at };
+            prop_assert!(!released(&short));
         }
 
         #[test]
@@ -350,13 +330,16 @@ mod tests {
             ahead in 0.0..2.0f64,
         ) {
             let (rig, schedule, steps, plan) = setting(back);
-            let distance = plan.approach.ready_from.to_num::<f64>() + ahead;
+            let distance = plan.approach.lift.to_num::<f64>() + ahead;
             let at = Course { felt: true, ..course(&plan, distance, 8.0, 33.3) };
             let got = schedule.targets(&steps, &plan, &at);
             // At most so fast that the missing preload is there first.
-            let missing = plan.cross_preload.to_num::<f64>() - 33.3;
-            let bound = ahead / (missing / rig.preload.slew_n_per_s);
-            prop_assert!(got.speed.to_num::<f64>() <= bound + 1e-3, "{} {bound}", got.speed);
+            let reached = schedule.reached_within.to_num::<f64>();
+            let missing = plan.cross_preload.to_num::<f64>() - 33.3 - reached;
+            let takes = missing / (0.98 * rig.preload.slew_n_per_s);
+            let release = plan.approach.release_time.to_num::<f64>();
+            let bound = ahead / (takes - release);
+            prop_assert!(got.speed.to_num::<f64>() <= bound + 0.01, "{} {bound}", got.speed);
             // It waits in earnest only for a preload that is behind its actuator.
             prop_assert!(!got.waiting);
             let late = Course { preload_late: true, ..at };

@@ -8,7 +8,7 @@ use crate::units::{Duty, MillimetresPerSecond, Newtons, Q16, Ratio, Travel, per_
 
 /// Largest error that is integrated, mm/s: a wheel that no longer answers must not wind
 /// the drive up before it is noticed.
-const MOST_ERROR: MillimetresPerSecond = q16(MOST_ERROR_MM_S as i64 * 1_000_000);
+const MOST_ERROR: MillimetresPerSecond = q16((MOST_ERROR_MM_S * 1e6) as i64);
 /// Full duty.
 const FULL: Ratio = q16(1_000_000);
 /// Most that the integral part may contribute, duty.

@@ -56,6 +56,7 @@ impl Estimator {
     pub fn follow(&self, state: &mut EstimateState, tick: &Follow<'_>) -> Findings {
         let mut found = Findings::default();
         let direction = state.direction;
+        state.history.step(self.stride, direction, tick.sensed.travel, tick.pressed);
         self.watch_slip(state, tick, &mut found);
         let seen = self.watch_input(state, tick.sensed);
         let event = self.watch.step(&mut state.watch, direction, &seen);
@@ -106,7 +107,9 @@ impl Estimator {
         let ahead = self.watch.to_face(&state.watch, direction, &seen);
         let position = position_of_radius(state, sensed);
         let Some(open) = state.crossing.as_mut().filter(|open| open.felt.is_none()) else { return };
-        open.felt = ahead.map(|ahead| match direction {
+        let Some(ahead) = ahead else { return };
+        open.felt_at = ahead;
+        open.felt = Some(match direction {
             Direction::Deploy => position + ahead,
             Direction::Retract => position - ahead,
         });
@@ -294,6 +297,8 @@ impl Estimator {
             at: tick.now,
             position: state.position,
             gap: lift.gap,
+            history: *state.history.history(),
+            distance: lift.distance,
             speed: state.crossing_speed.speed(FILTER_LAG, sensed.speed.value),
             held: sensed.speed.value,
             preload: sensed.preload_filtered,

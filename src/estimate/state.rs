@@ -8,6 +8,7 @@ use super::tread::{Shown, TreadState};
 use super::{CornerSlip, Place, Position, PositionConfidence};
 use crate::fault::{Fault, Limit};
 use crate::model::LimitedBy;
+use crate::model::history::{History, HistoryWriter};
 use crate::numeric::LowPassState;
 use crate::units::{
     Direction, Millimetres, MillimetresPerSecond, Newtons, Q16, Ratio, Tick, Travel, q16,
@@ -27,6 +28,7 @@ pub struct EstimateState {
     /// Crossing watch.
     pub watch: WatchState,
     pub(super) tread: TreadState,
+    pub(super) history: HistoryWriter,
     /// Preload behind the memory of the tread, N.
     pub(super) remembered: LowPassState,
     /// Speed behind it.
@@ -76,6 +78,8 @@ pub struct OpenCrossing {
     pub touched_at: Tick,
     /// Position of the face by the corner that carries, as soon as it shows, mm.
     pub felt: Option<Millimetres>,
+    /// Distance to the face when it first showed, mm.
+    pub felt_at: Millimetres,
     /// Slide of a retracting wheel before it lands, and its landing.
     pub slide: Slide,
     /// See `slide`.
@@ -111,6 +115,10 @@ pub struct LiftPoint {
     pub position: Millimetres,
     /// Gap with the nominal step height, mm: of a wheel as deep in the corner.
     pub gap: Millimetres,
+    /// How the wheel came here, and its distance to the face, mm.
+    pub history: History,
+    /// See `history`.
+    pub distance: Millimetres,
     /// Wheel speed as the tread remembers it, mm/s.
     pub speed: MillimetresPerSecond,
     /// Wheel speed in that tick, mm/s.

@@ -3,7 +3,6 @@
 #![deny(clippy::float_arithmetic)]
 
 use crate::model::corner_profile::CornerProfile;
-use crate::model::formula::Formula;
 use crate::numeric::checked;
 use crate::rig::{MAX_STEPS, Rig, RigError};
 use crate::units::{Direction, Millimetres, Q16, q16};
@@ -66,7 +65,7 @@ impl Steps {
                 checked("rig.step_height_mm", deploy)?,
                 -checked("rig.step_height_mm", retract)?,
             ],
-            corner_reach: checked("rig.step_height_mm", Formula::new(rig).free_run_mm())?,
+            corner_reach: checked("rig.step_height_mm", rig.corner_reach_mm())?,
         })
     }
 

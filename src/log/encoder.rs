@@ -135,6 +135,7 @@ mod tests {
     use super::super::ledger::tests::crossing;
     use super::*;
     use crate::fault::Limit;
+    use crate::model::history::History;
     use crate::model::{Approach, Learned, LimitedBy, Outcome, Plan, PlanRequest, Review};
     use crate::supervise::Mode;
     use crate::tick::CrossingRecord;
@@ -264,8 +265,10 @@ mod tests {
         };
         let review = Review {
             direction: Direction::Retract,
-            speed: most,
-            preload: most,
+            history: History::steady(u16::MAX, most),
+            distance: most,
+            held: most,
+            felt_at: Some(most),
             tan_arm: most,
             gap: most,
             seen: most,
@@ -276,7 +279,7 @@ mod tests {
             scale: most,
             deviation: most,
             unknown: true,
-            reserve: most,
+            felt_late: [most; 2],
             extra_load: most,
             grips: most,
             slips: most,
@@ -317,10 +320,8 @@ mod tests {
             approach: Approach {
                 window_from: most,
                 window_speed: most,
-                slow_from: most,
+                brake_from: most,
                 slowest_speed: most,
-                ready_from: most,
-                earlier_per_preload: most,
                 release_from: most,
                 release_time: most,
                 lift: most,

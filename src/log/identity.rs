@@ -7,7 +7,7 @@ use crate::units::Millimetres;
 
 /// Layout of the frames. Raised with every change of it; a reader of another number reports
 /// that and decodes nothing.
-pub const SCHEMA: u16 = 6;
+pub const SCHEMA: u16 = 7;
 
 /// Longest version, build and name, bytes.
 pub const MAX_TEXT: usize = 24;

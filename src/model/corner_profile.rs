@@ -3,7 +3,6 @@
 
 #![deny(clippy::float_arithmetic)]
 
-use super::formula::Formula;
 use crate::numeric::{Table, checked};
 use crate::rig::{Rig, RigError};
 use crate::units::{Direction, Millimetres, Q16, Ratio};
@@ -45,11 +44,10 @@ impl CornerProfile {
     #[allow(clippy::float_arithmetic, reason = "SI to machine units, once at start")]
     pub fn try_build(rig: &Rig) -> Result<Self, RigError> {
         let (r, h) = (rig.rig.wheel_radius_mm, rig.rig.step_height_mm);
-        let formula = Formula::new(rig);
         let (corner, wall) = (CORNER_PART * h, WALL_PART * h);
         let reach = r - corner;
         let low = r - h - wall;
-        let touch = libm::sqrt(r * r - low * low).max(formula.free_run_mm());
+        let touch = libm::sqrt(r * r - low * low).max(rig.corner_reach_mm());
         let patch = 1.4 * libm::sqrt(r * r - (r - wall) * (r - wall));
         // Lift-off, and where the circle has taken over from the run-in.
         let lift = libm::sqrt((reach * reach - (r - h) * (r - h)).max(0.01));

@@ -1,5 +1,7 @@
 //! Requests of the tick to the model task, and its answers.
 
+use super::approach::Approach;
+use super::history::History;
 use crate::fault::Limit;
 use crate::units::{Direction, Millimetres, MillimetresPerSecond, Newtons, Ratio, Seconds, q16};
 
@@ -64,10 +66,14 @@ impl LimitedBy {
 pub struct Review {
     /// Direction of the crossing.
     pub direction: Direction,
-    /// Speed at lift-off, mm/s.
-    pub speed: MillimetresPerSecond,
-    /// Measured preload at lift-off, N.
-    pub preload: Newtons,
+    /// How the wheel came to lift-off, and its distance to the face then, mm.
+    pub history: History,
+    /// See `history`.
+    pub distance: Millimetres,
+    /// Wheel speed then, mm/s.
+    pub held: MillimetresPerSecond,
+    /// Distance to the face at which the corner was felt, mm, if it was.
+    pub felt_at: Option<Millimetres>,
     /// Tangent of the arm angle at lift-off.
     pub tan_arm: Ratio,
     /// Measured gap of a step of nominal height, mm: how high this one is shows the sleeve, not
@@ -90,8 +96,8 @@ pub struct Learned {
     pub deviation: Ratio,
     /// The tread has shown before the first crossing that it is not as known.
     pub unknown: bool,
-    /// Share of the rig's reserve below the reference gap.
-    pub reserve: Ratio,
+    /// By how much later than by the rig's geometry a corner is felt, deploy and retract, mm.
+    pub felt_late: [Millimetres; 2],
     /// Axial load on this wheel beyond that of the rig, N; 0 until the drive has shown another.
     pub extra_load: Newtons,
     /// Largest utilisation of friction, by the model, that has gripped: a lower bound of the
@@ -108,7 +114,7 @@ impl Default for Learned {
             scale: Ratio::ONE,
             deviation: KNOWN_DEVIATION,
             unknown: false,
-            reserve: Ratio::ONE,
+            felt_late: [Millimetres::ZERO; 2],
             extra_load: Newtons::ZERO,
             grips: Ratio::ZERO,
             slips: Ratio::MAX,
@@ -144,8 +150,7 @@ pub struct Outcome {
     pub gap_predicted: Millimetres,
     /// Friction left unused at that point.
     pub slip_margin: Ratio,
-    /// What is learned with this crossing. Of the reserve half of the last share is kept, and
-    /// what this crossing missed its prediction by.
+    /// What is learned with this crossing.
     pub learned: Learned,
     /// Whether the correction reached the end of its range.
     pub bounded: bool,
@@ -153,30 +158,6 @@ pub struct Outcome {
     pub strange: bool,
     /// Whether the measured gap is wider than the reference by more than 3 %.
     pub wide: bool,
-}
-
-/// How the wheel comes to a step. Distances are axial, along the run, to the face of the step.
-#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct Approach {
-    /// Where the corner may first be felt, mm.
-    pub window_from: Millimetres,
-    /// Speed from there on, mm/s: from it the slowest is reached in time.
-    pub window_speed: MillimetresPerSecond,
-    /// Where the wheel must be slowest, mm: at lift-off, less what the tread remembers.
-    pub slow_from: Millimetres,
-    /// Speed down to which it brakes, mm/s.
-    pub slowest_speed: MillimetresPerSecond,
-    /// Where the preload must be reached, mm.
-    pub ready_from: Millimetres,
-    /// How much earlier the wheel lifts off per preload that it lacks, mm/N.
-    pub earlier_per_preload: Ratio,
-    /// Where it may speed up again, mm: before lift-off, or at that of the model (retract:
-    /// touch-down).
-    pub release_from: Millimetres,
-    /// Time from there to lift-off, s; 0 if it speeds up there.
-    pub release_time: Seconds,
-    /// Lift-off (retract: touch-down), mm.
-    pub lift: Millimetres,
 }
 
 /// Speed and preload up to the next step and over it.

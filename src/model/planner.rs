@@ -1,35 +1,39 @@
-//! The schedule: speed and preload that hold the gap at the next step.
+//! The schedule: the fastest course over the next step that keeps the gap and the friction margin,
+//! by rolling the tread out over it.
 
 #![deny(clippy::float_arithmetic)]
 
-mod approach;
 #[allow(clippy::float_arithmetic, reason = "SI to machine units, once at start")]
 mod build;
+mod course;
+mod review;
+mod search;
 
-pub use approach::KNOWN_SCALE;
-
-use super::dip::Dip;
+use super::approach::Approach;
 use super::guard::Guard;
-use super::plan::{
-    Approach, KNOWN_DEVIATION, Learned, LimitedBy, Outcome, Plan, PlanRequest, Review, Strategy,
-};
-use super::reduced::{Point, ReducedModel, Scale};
+use super::plan::{Learned, LimitedBy, Plan, PlanRequest, Strategy};
+use super::profile::Profile;
 use super::timing::Timing;
+use super::tread::{Tread, TreadState};
 use crate::fault::Limit;
 use crate::numeric::{between, divide, sqrt};
 use crate::rig::MAX_STEPS;
 use crate::units::{
-    Direction, Millimetres, MillimetresPerSecond, Newtons, Q16, Ratio, Seconds, q16,
+    Direction, Millimetres, MillimetresPerSecond, Newtons, NewtonsPerSecond, Q16, Ratio, Seconds,
+    q16,
 };
+use course::{Course, Scene};
+use embassy_futures::block_on;
+use search::Search;
 
 /// One sigma of the logarithm of the stiffness of a tread that has shown before the first crossing
 /// that it is not as known.
 pub const SHOWN_DEVIATION: Ratio = q16(240_000);
-/// Variance of a measured stiffness of a tread that is not as known, 0.2 squared: at the next speed
-/// its gap is another by 5 to 6 %, its stiffness by three to four times that.
-const UNKNOWN_VARIANCE: Ratio = q16(40_000);
-/// A measured stiffness further off than so many sigmas, squared, contradicts what is known.
-const SURPRISE: Q16 = q16(9_000_000);
+/// Stiffness scale up to which the tread is as known: three deviations.
+pub const KNOWN_SCALE: Ratio = q16(1_150_000);
+/// Deviations of the stiffness by which the plan takes the tread for stiffer than it seems: five of
+/// six are not stiffer.
+const SIGMAS: Ratio = q16(1_000_000);
 
 /// Relative difference of an observed stiffness above which it is reported. Rubber that is off
 /// by three deviations makes 0.12 at the first crossing; the rest is the measurement, where a
@@ -39,21 +43,6 @@ const STRANGE: Ratio = q16(270_000);
 /// Measured gap over the reference from which it is reported: twice the error of the measurement
 /// on coupled treads.
 const WIDE: Ratio = q16(1_030_000);
-
-/// Bounds of the reserve that the crossings leave, as shares of the rig's.
-const LEAST_RESERVE: Ratio = q16(333_333);
-const MOST_RESERVE: Ratio = q16(2_000_000);
-
-/// Preloads between that of cruise and the limit that are compared, and their distance as a
-/// part of the range.
-const PRELOADS: u32 = 16;
-const PRELOAD_STEP: Ratio = q16(62_500);
-
-/// Part of the cruise preload with which the wheel may cross while the preload is being built up.
-const BUILDING: Ratio = q16(900_000);
-
-/// Error of the model's inverse, N.
-const HOLDS_WITHIN: Newtons = q16(100_000);
 
 /// Friction margin that a second is worth, 1/s: 0.01 for half a second. With the need read up to
 /// 0.06 too low and the friction known to 3 %, a margin of 0.05 is short in one crossing of ten, and
@@ -68,21 +57,41 @@ const LIKELY_TIMES: Q16 = q16(3_000_000);
 /// Difference of the friction needed that is none: a preload counts as reached within 2 %.
 const SAME_NEED: Ratio = q16(5_000);
 
-/// Smaller gap that is compared, as a part.
-const SMALLER: Ratio = q16(980_000);
+/// Relative difference of a gap from its target that is none.
+const SAME_GAP: Ratio = q16(10_000);
 
-/// Halvings by which the gap is found that leaves the slip margin: to 0.4 % of it, which is 3 % of
-/// the speed.
-const GRIP_HALVINGS: usize = 7;
+/// Height that the centre lacks at lift-off where the search begins, mm: what the tread still keeps of
+/// its compression.
+const SHORT: Millimetres = q16(110_000);
+
+/// How a wheel falls behind its profile while a corner is not fed forward.
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+struct DriveModel {
+    /// Part of the lag that the speed loop makes good in a tick.
+    decay: Q16,
+    /// Speed lost per load that appears, mm/s/N.
+    lag_per_load: Q16,
+}
+
+/// How the preload follows its command.
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+struct PretightenerModel {
+    /// Dead time and lag, s.
+    settles: Seconds,
+    /// Rate of a rise, N/s.
+    rate: NewtonsPerSecond,
+}
 
 /// The model side of the schedule; runs outside the tick. The default is a place to read one
 /// into.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Planner {
-    model: ReducedModel,
-    guard: Guard,
+    tread: Tread,
+    profile: Profile,
     timing: Timing,
-    dip: Dip,
+    drive: DriveModel,
+    pretightener: PretightenerModel,
+    guard: Guard,
     strategy: Strategy,
     /// Tangent of the arm angle at each step.
     tangents: heapless::Vec<Ratio, MAX_STEPS>,
@@ -92,10 +101,8 @@ pub struct Planner {
     load: Newtons,
     /// Gap to hold, deploy and retract, mm.
     gap_ref: [Millimetres; 2],
-    /// Part by which the gap aimed at is below it while no crossing has shown what the tread
-    /// does, and its reciprocal; 0 for none.
+    /// Part by which the gap aimed at is below it.
     reserve: Ratio,
-    by_reserve: Q16,
     cruise_speed: MillimetresPerSecond,
     least_speed: MillimetresPerSecond,
     safe_speed: MillimetresPerSecond,
@@ -109,6 +116,8 @@ pub struct Planner {
     radius: Millimetres,
     /// Tolerance of a step's place, mm.
     tolerance: Millimetres,
+    /// Distance to the face at which a wheel that is not compressed touches the corner, mm.
+    touch_at: Millimetres,
     /// Distance to the face at which the corner shows where it is, deploy and retract, mm.
     felt_at: [Millimetres; 2],
     /// Preload with which the wheel may roll along the wall, N.
@@ -120,25 +129,36 @@ pub struct Planner {
     /// The part of it that may be used.
     usable: Ratio,
     scale_range: (Ratio, Ratio),
-    /// Variance of the logarithm of a measured stiffness.
-    measured_variance: Ratio,
 }
 
 impl Planner {
-    /// Answers a request.
+    /// Answers a request at once.
     pub fn plan(&self, request: &PlanRequest) -> Plan {
+        block_on(self.plan_pausing(&mut TreadState::default(), request, async || ()))
+    }
+
+    /// Answers a request with a tread from outside, whose two kilobytes are never on the stack; it
+    /// pauses after each rollout, so that tasks beside it run on.
+    pub async fn plan_pausing(
+        &self,
+        state: &mut TreadState,
+        request: &PlanRequest,
+        mut pause: impl AsyncFnMut(),
+    ) -> Plan {
+        let pause = &mut pause;
         let mut learned = request.learned;
         learned.scale = between(learned.scale, self.scale_range.0, self.scale_range.1);
-        let outcome = request.review.map(|review| self.review(&review, &learned));
-        let mut learned = outcome.map_or(learned, |outcome| outcome.learned);
+        let outcome = match request.review.as_ref() {
+            Some(review) => Some(self.review((&mut *state, &mut *pause), review, &learned).await),
+            None => None,
+        };
+        let mut learned = outcome.as_ref().map_or(learned, |outcome| outcome.learned);
         if let Some(force) = request.slipped {
-            let at = Point {
-                extra_load: learned.extra_load,
-                ..Point::nominal(request.direction, self.least_speed)
-            };
-            let used = self.model.crossing(&at, force).utilisation;
+            let used = self.needed_at_least_speed(state, request, &learned, force);
             learned.slips = learned.slips.min(used.max(learned.grips));
         }
+        // Until the step behind has been reviewed, the tread may turn out stiffer.
+        let rises_further = request.review.is_none();
         let (cruise_speed, moved) = self.guard.below(self.cruise_speed);
         let limits = [moved.then_some(Limit::ResonanceAvoided), None, None];
         let mut plan = Plan {
@@ -150,11 +170,8 @@ impl Planner {
             cruise_preload: self.between_steps(),
             cross_preload: self.between_steps(),
             ramp_preload: self.between_steps(),
-            most_preload: match self.strategy {
-                Strategy::Constant => self.cruise_preload,
-                _ => self.most_preload,
-            },
-            gap: self.target(request.direction, learned.reserve),
+            most_preload: self.most(),
+            gap: self.target(request.direction),
             slip_margin: self.usable,
             slips: learned.slips,
             short: false,
@@ -173,7 +190,8 @@ impl Planner {
             outcome,
         };
         if request.step > 0 {
-            self.crossing(&PlanRequest { learned, ..*request }, &mut plan);
+            let request = PlanRequest { learned, review: None, ..*request };
+            self.crossing((state, pause), &request, rises_further, &mut plan).await;
         }
         if self.uniform {
             plan.cruise_speed = plan.cross_speed;
@@ -187,15 +205,47 @@ impl Planner {
         self.gap_ref[direction as usize]
     }
 
-    /// Speed and preload at the step.
-    fn crossing(&self, request: &PlanRequest, plan: &mut Plan) {
-        let at = Point {
+    /// Distance to the face at which the corner is felt, mm: as learned, or under a tread that is not
+    /// as known as late as it may be.
+    fn felt_at(&self, request: &PlanRequest) -> Millimetres {
+        let direction = request.direction as usize;
+        let late = request.learned.felt_late[direction];
+        let unsure = request.learned.unknown && late == Q16::ZERO;
+        self.felt_at[direction] - if unsure { review::FELT_LATE } else { late }
+    }
+
+    fn scene(&self, request: &PlanRequest, cruise: MillimetresPerSecond) -> Scene {
+        let learned = &request.learned;
+        // Under more load than was told, all the preload that there is until a crossing has gripped.
+        let waits = learned.extra_load > Q16::ZERO && learned.grips == Q16::ZERO;
+        Scene {
             direction: request.direction,
-            speed: self.least_speed,
-            scale: Scale::new(request.learned.scale),
-            extra_load: request.learned.extra_load,
-        };
-        let arm_thrust = self.arm_thrust_at(request);
+            load: self.load + learned.extra_load,
+            felt_at: self.felt_at(request),
+            scale: learned.scale * (Ratio::ONE + SIGMAS * learned.deviation),
+            cruise,
+            arm_thrust: self.arm_thrust_at(request),
+            preload: if waits { self.most() } else { request.preload },
+            most: self.most(),
+            reacts: self.strategy == Strategy::Reactive,
+            distance: request.distance,
+            starts: (request.preload < self.rolling_preload).then(|| {
+                let missing = self.rolling_preload - request.preload;
+                self.pretightener.settles + divide(missing, self.pretightener.rate)
+            }),
+        }
+    }
+
+    /// Speed and preload at the step.
+    async fn crossing(
+        &self,
+        (state, pause): (&mut TreadState, &mut impl AsyncFnMut()),
+        request: &PlanRequest,
+        rises_further: bool,
+        plan: &mut Plan,
+    ) {
+        let learned = &request.learned;
+        let scene = self.scene(request, plan.cruise_speed);
         let floor = self.least_speed.min(plan.cruise_speed);
         // No faster than the pre-tightener can follow the spring over the corner.
         let ceiling = plan.cruise_speed.min(self.climb_speed.max(floor));
@@ -203,203 +253,83 @@ impl Planner {
             Some(speed) => (speed, speed),
             None => (floor, ceiling),
         };
-        let choice = self.choose(request, &at, arm_thrust, (floor, ceiling));
-        let Choice { preload: most, gap, speed, rising, .. } = choice;
-        let (speed, moved) = self.guard.below(speed);
-        if moved {
-            add(&mut plan.limits, Limit::ResonanceAvoided);
-        }
-        plan.limited_by = if moved && speed >= floor {
-            LimitedBy::Resonance
-        } else {
-            self.limited_by(
-                &choice,
-                self.target(request.direction, request.learned.reserve),
-                (floor, ceiling),
-                plan.most_preload,
-            )
-        };
+        let mut search = Search::new(self, (&mut *state, pause), scene, request, (floor, ceiling));
+        let course = search.fastest().await;
         // A band that reaches below the floor is entered: too slow would be worse.
-        let speed = speed.max(floor);
-        let at = Point { speed, ..at };
-        let wanted = self.model.force(&at, gap) - arm_thrust;
-        plan.cross_speed = speed;
-        if wanted > most + HOLDS_WITHIN && speed <= floor {
-            add(&mut plan.limits, Limit::SpeedFloor);
-        } else if wanted >= self.most_preload * q16(980_000) && speed < self.safe_speed {
-            add(&mut plan.limits, Limit::PreloadLimited);
-        }
+        let (speed, moved) = self.guard.below(course.approach.slowest_speed);
+        let moved = moved && speed >= floor;
+        let course = if moved {
+            let approach = Approach { slowest_speed: speed, ..course.approach };
+            Course { approach, rolled: self.roll_out(state, &scene, &approach) }
+        } else {
+            course
+        };
+        let Course { approach, rolled } = course;
+        let slowest = approach.slowest_speed;
+        plan.approach = Approach { release_time: rolled.released, lift: rolled.lift, ..approach };
+        plan.cross_speed = self.prescribed_speed.unwrap_or(rolled.speed.max(slowest));
         plan.cross_preload = match self.strategy {
-            Strategy::Scheduled => {
-                // Below that of cruise only where the choice is.
-                wanted.max(most.min(self.cruise_preload)).min(most)
-            }
-            Strategy::Constant => self.cruise_preload,
             Strategy::Limit => self.most_preload,
-            Strategy::Reactive => wanted.clamp(self.cruise_preload, self.most_preload),
+            _ => rolled.preload,
         };
         plan.ramp_preload = plan.cross_preload;
-        // Until the step behind has been reviewed, the tread may turn out stiffer.
-        if self.strategy == Strategy::Scheduled && (rising || request.review.is_none()) {
+        let raises = self.strategy == Strategy::Scheduled && (rolled.rising || rises_further);
+        if raises || scene.reacts {
             plan.ramp_preload = self.most_preload;
         }
-        let carried = plan.cross_preload.min(most) + arm_thrust;
-        let crossing = self.model.crossing(&at, carried);
-        plan.gap = crossing.gap;
-        let (friction, _) = self.friction_of(&request.learned);
-        let margin = friction - crossing.utilisation;
-        plan.slip_margin = margin;
-        plan.short = crossing.utilisation + SAME_NEED >= request.learned.slips;
-        if margin < self.friction - self.usable {
-            add(&mut plan.limits, Limit::SlipMarginLow);
-        }
-        plan.approach = self.approach(request, &at, carried, plan.gap);
-        plan.approach.earlier_per_preload =
-            self.earlier_per_preload(&at, carried, plan.approach.lift);
-    }
-
-    /// What keeps a crossing of this choice from being faster.
-    fn limited_by(
-        &self,
-        choice: &Choice,
-        target: Millimetres,
-        (floor, ceiling): (MillimetresPerSecond, MillimetresPerSecond),
-        most: Newtons,
-    ) -> LimitedBy {
-        if choice.speed >= ceiling {
+        plan.gap = rolled.gap;
+        let (friction, _) = self.friction_of(learned);
+        plan.slip_margin = friction - rolled.utilisation;
+        plan.short = rolled.utilisation + SAME_NEED >= learned.slips;
+        let target = self.target(request.direction);
+        plan.limited_by = if moved {
+            add(&mut plan.limits, Limit::ResonanceAvoided);
+            LimitedBy::Resonance
+        } else if slowest >= ceiling {
             LimitedBy::Drive
-        } else if choice.speed <= floor {
-            LimitedBy::LeastSpeed
-        } else if choice.gap < target {
+        } else if rolled.gap < target - target * SAME_GAP {
             LimitedBy::Friction
-        } else if choice.preload < most {
+        } else if slowest <= floor {
+            LimitedBy::LeastSpeed
+        } else if rolled.rising {
             LimitedBy::Slew
         } else {
             LimitedBy::Preload
+        };
+        if rolled.gap > target + target * SAME_GAP && slowest <= floor {
+            add(&mut plan.limits, Limit::SpeedFloor);
+        } else if !rolled.rising && slowest < self.safe_speed {
+            add(&mut plan.limits, Limit::PreloadLimited);
+        }
+        if plan.slip_margin < self.friction - self.usable {
+            add(&mut plan.limits, Limit::SlipMarginLow);
         }
     }
 
-    /// The preload, and with it the speed, with which the wheel is over the step soonest: more
-    /// preload takes time to build, less makes the crossing slow.
-    fn choose(
+    /// Friction that a crossing at the least speed needs under this radial force, N.
+    fn needed_at_least_speed(
         &self,
+        state: &mut TreadState,
         request: &PlanRequest,
-        at: &Point,
-        arm_thrust: Newtons,
-        bounds: (MillimetresPerSecond, MillimetresPerSecond),
-    ) -> Choice {
-        let (low, high) = match self.strategy {
-            Strategy::Scheduled => (self.least_preload(request), self.most_preload),
-            Strategy::Limit => (self.most_preload, self.most_preload),
-            Strategy::Constant => (self.cruise_preload, self.cruise_preload),
-            Strategy::Reactive => {
-                let reached = self.reached_on_corner(request, at, arm_thrust, bounds);
-                (reached, reached)
-            }
+        learned: &Learned,
+        force: Newtons,
+    ) -> Ratio {
+        let scene = self.scene(&PlanRequest { learned: *learned, ..*request }, self.cruise_speed);
+        let preload = force - scene.arm_thrust;
+        let scene = Scene { preload, most: preload, scale: learned.scale, starts: None, ..scene };
+        let approach = Approach {
+            window_from: self.touch_at,
+            window_speed: self.least_speed,
+            slowest_speed: self.least_speed,
+            ..Approach::default()
         };
-        let mut best = self.gripping(request, at, high, arm_thrust, bounds);
-        for part in 1..=PRELOADS {
-            if high == low {
-                break;
-            }
-            let preload = high - (high - low) * Q16::from_num(part) * PRELOAD_STEP;
-            let choice = self.gripping(request, at, preload, arm_thrust, bounds);
-            if choice.better_than(&best) {
-                best = choice;
-            }
-        }
-        best
+        self.roll_out(state, &scene, &approach).utilisation
     }
 
-    /// The most preload that a rise which begins at the corner still reaches before lift-off
-    /// (retract: touch-down), at the speed that this preload allows.
-    fn reached_on_corner(
-        &self,
-        request: &PlanRequest,
-        at: &Point,
-        arm_thrust: Newtons,
-        (floor, ceiling): (MillimetresPerSecond, MillimetresPerSecond),
-    ) -> Newtons {
-        let gap = self.target(request.direction, request.learned.reserve);
-        let run = self.felt_at[request.direction as usize] - self.lift(request.direction, gap);
-        let step = (self.most_preload - self.cruise_preload) * PRELOAD_STEP;
-        let preload = |part: u32| self.cruise_preload + step * Q16::from_num(part);
-        let reached = (1..=PRELOADS).take_while(|&part| {
-            let speed = self.model.speed(at, gap, preload(part) + arm_thrust, floor, ceiling);
-            self.timing.preload_change(preload(part) - self.cruise_preload) <= divide(run, speed)
-        });
-        preload(reached.last().unwrap_or(0))
-    }
-
-    /// With this preload: the largest gap up to the target, and the speed with it, that leave
-    /// the slip margin, or as much of it as is worth its time.
-    fn gripping(
-        &self,
-        request: &PlanRequest,
-        at: &Point,
-        preload: Newtons,
-        arm_thrust: Newtons,
-        (floor, ceiling): (MillimetresPerSecond, MillimetresPerSecond),
-    ) -> Choice {
-        let target = self.target(request.direction, request.learned.reserve);
-        let carried = preload + arm_thrust;
-        let (friction, usable) = self.friction_of(&request.learned);
-        let speed_at = |gap| self.model.speed(at, gap, carried, floor, ceiling);
-        let used = |gap, speed| self.model.utilisation(&Point { speed, ..*at }, gap);
-        // Time that the missing margin is worth, and that which the crossing takes, s.
-        let price = |used: Ratio| {
-            let likely = (used - (friction - READ_LOW)).max(Q16::ZERO) * LIKELY_TIMES;
-            divide((used - usable).max(Q16::ZERO) + likely, MARGIN_PER_SECOND)
-        };
-        let takes = |gap: Millimetres, speed| {
-            let approach = self.approach(request, &Point { speed, ..*at }, carried, gap);
-            self.travels(request.distance, &approach)
-                + self.lost(approach.slowest_speed, self.cruise_speed)
-        };
-        let grips = |gap: Millimetres, speed| {
-            let needs = used(gap, speed);
-            let smaller = gap * SMALLER;
-            let slower = speed_at(smaller);
-            needs <= usable
-                || needs < friction
-                    && takes(gap, speed) + price(needs)
-                        <= takes(smaller, slower) + price(used(smaller, slower))
-        };
-        let (mut gap, mut speed) = (target, speed_at(target));
-        if !grips(gap, speed) && speed > floor {
-            let mut part = target.half();
-            gap = part;
-            for _ in 0..GRIP_HALVINGS {
-                part = part.half();
-                let larger = gap + part;
-                let speed = speed_at(larger);
-                if grips(larger, speed) || speed <= floor {
-                    gap = larger;
-                }
-            }
-            speed = speed_at(gap);
-        }
-        let at = Point { speed, ..*at };
-        let carries = self.model.force(&at, gap) <= carried + HOLDS_WITHIN;
-        let holds = carries && grips(gap, speed);
-        let approach = self.approach(request, &at, carried, gap);
-        let until = |preload: Newtons| {
-            self.timing.preload_change((preload - request.preload).max(Q16::ZERO))
-        };
-        // Below the cruise preload a wheel that stays slow would wait for long on the corner.
-        let holds =
-            holds && (preload >= self.cruise_preload || approach.release_time > Seconds::ZERO);
-        let ready = until(preload);
-        let starts = if request.preload < self.rolling_preload {
-            until(self.rolling_preload)
-        } else {
-            Seconds::ZERO
-        };
-        let travels = starts + self.travels(request.distance, &approach);
-        let rising = ready > travels;
-        let time = ready.max(travels) + self.lost(approach.slowest_speed, self.cruise_speed);
-        let time = time + price(used(gap, speed));
-        Choice { preload, gap, speed, time, rising, holds }
+    /// Time that the margin of friction is worth which is missing, s.
+    fn price(&self, used: Ratio, friction: Ratio, usable: Ratio) -> Seconds {
+        let likely = (used - (friction - READ_LOW)).max(Q16::ZERO) * LIKELY_TIMES;
+        divide((used - usable).max(Q16::ZERO) + likely, MARGIN_PER_SECOND)
     }
 
     /// Distance and time of braking before the step.
@@ -409,65 +339,6 @@ impl Planner {
         plan.brake_distance =
             self.timing.brake_distance(plan.cruise_speed, plan.approach.slowest_speed);
         plan.brake_time = self.timing.speed_change(plan.cruise_speed - plan.approach.slowest_speed);
-    }
-
-    /// Compares a crossing with the model, and learns from it.
-    ///
-    /// A scalar Kalman filter on the logarithm of the stiffness scale. What is known of the tread is
-    /// never surer than of one as known: each sleeve is another. A stiffness that contradicts
-    /// what is known makes that uncertain by as much: a stiffer one is taken at once, too
-    /// stiff a guess only costs time; a softer one with the next that agrees.
-    fn review(&self, review: &Review, known: &Learned) -> Outcome {
-        let at = Point {
-            direction: review.direction,
-            speed: review.speed,
-            scale: Scale::new(known.scale),
-            extra_load: known.extra_load,
-        };
-        let force = review.preload + self.thrust(known, review.tan_arm);
-        let crossing = self.model.crossing(&at, force);
-        let (friction, _) = self.friction_of(known);
-        let mut outcome = Outcome {
-            gap_predicted: crossing.gap,
-            slip_margin: friction - crossing.utilisation,
-            learned: *known,
-            bounded: false,
-            strange: false,
-            wide: review.seen > self.gap_ref(review.direction) * WIDE,
-        };
-        if !review.trusted {
-            return outcome;
-        }
-        let learned = &mut outcome.learned;
-        if !review.slipped {
-            learned.grips = learned.grips.max(crossing.utilisation);
-        }
-        let ratio = divide(self.model.observed_scale(&at, review.gap, force), known.scale);
-        outcome.strange = (ratio - Q16::ONE).abs() > STRANGE;
-        // The logarithm, by its first Pade approximant: at most 2 in magnitude.
-        let off = divide((ratio - Q16::ONE) + (ratio - Q16::ONE), ratio + Q16::ONE);
-        let measured = if known.unknown {
-            UNKNOWN_VARIANCE.max(self.measured_variance)
-        } else {
-            self.measured_variance
-        };
-        let mut variance = known.deviation * known.deviation;
-        let beyond = off * off - measured;
-        let surprising = off * off > (variance + measured) * SURPRISE;
-        if surprising && off > Q16::ZERO {
-            variance = beyond;
-        }
-        let gain = divide(variance, variance + measured);
-        variance = if surprising && off < Q16::ZERO { beyond } else { gain * measured };
-        learned.deviation = sqrt(variance).max(KNOWN_DEVIATION);
-        let half = off * gain.half();
-        let wanted = known.scale * divide(Q16::ONE + half, Q16::ONE - half);
-        learned.scale = between(wanted, self.scale_range.0, self.scale_range.1);
-        let missed = divide((review.gap - crossing.gap).abs(), review.gap.max(q16(100_000)));
-        let reserve = known.reserve.half() + missed * self.by_reserve;
-        learned.reserve = reserve.clamp(LEAST_RESERVE, MOST_RESERVE);
-        outcome.bounded = learned.scale != wanted;
-        outcome
     }
 
     /// Friction as far as known, and the part of it that may be used. What has gripped may be used
@@ -490,17 +361,6 @@ impl Planner {
         self.thrust(&request.learned, tangent)
     }
 
-    /// Least preload for the step ahead, N: that of cruise, or less while it is being built up. Under
-    /// more load than was told, all that there is until a crossing has gripped.
-    fn least_preload(&self, request: &PlanRequest) -> Newtons {
-        let Learned { extra_load, grips, .. } = request.learned;
-        if extra_load > Q16::ZERO && grips == Q16::ZERO {
-            return self.most_preload;
-        }
-        let least = self.cruise_preload * BUILDING;
-        request.preload.clamp(least, self.cruise_preload)
-    }
-
     fn between_steps(&self) -> Newtons {
         match self.strategy {
             Strategy::Limit => self.most_preload,
@@ -508,32 +368,40 @@ impl Planner {
         }
     }
 
-    /// Gap aimed at with this share of the reserve, mm.
-    fn target(&self, direction: Direction, share: Ratio) -> Millimetres {
-        let gap = self.gap_ref(direction);
-        gap - gap * (self.reserve * share)
+    /// Highest preload that the strategy allows, N.
+    fn most(&self) -> Newtons {
+        match self.strategy {
+            Strategy::Constant => self.cruise_preload,
+            _ => self.most_preload,
+        }
     }
-}
 
-/// A preload with what it allows.
-#[derive(Clone, Copy, Debug)]
-struct Choice {
-    preload: Newtons,
-    gap: Millimetres,
-    speed: MillimetresPerSecond,
-    /// Until the step is behind, s, but for what is the same for every preload, and what the
-    /// missing margin is worth.
-    time: Seconds,
-    /// The wheel waits for it: it lifts off while the preload rises.
-    rising: bool,
-    /// It holds the gap and keeps the slip margin.
-    holds: bool,
-}
+    /// Gap aimed at, mm.
+    fn target(&self, direction: Direction) -> Millimetres {
+        let gap = self.gap_ref(direction);
+        gap - gap * self.reserve
+    }
 
-impl Choice {
-    /// Sooner over the step, if it holds; of those that do not, the highest preload is best.
-    fn better_than(&self, higher: &Self) -> bool {
-        self.holds && (!higher.holds || self.time < higher.time)
+    /// Distance along the run to the face at lift-off (retract: touch-down) with this gap, mm.
+    fn lift(&self, direction: Direction, gap: Millimetres) -> Millimetres {
+        // The tread's memory leaves the wall before the centre is as high as the free wheel's.
+        let height = match direction {
+            Direction::Deploy => self.radius - SHORT,
+            Direction::Retract => self.radius,
+        };
+        let reach = self.radius + gap;
+        let lift = sqrt((reach - height) * (reach + height));
+        match direction {
+            Direction::Deploy => lift,
+            Direction::Retract => -lift,
+        }
+    }
+
+    /// Time that a change between these speeds takes longer than its distance at cruise speed, s.
+    fn lost(&self, slow: MillimetresPerSecond, fast: MillimetresPerSecond) -> Seconds {
+        let mean = (slow + fast).half();
+        let share = divide(self.cruise_speed - mean, self.cruise_speed);
+        self.timing.speed_change(fast - slow) * share.max(Q16::ZERO)
     }
 }
 

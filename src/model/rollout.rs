@@ -58,7 +58,13 @@ impl LiftOff {
             Direction::Retract => !carried && carries,
         };
         if found {
-            let part = divide(before.floor, before.floor - now.floor);
+            let part = match direction {
+                Direction::Deploy => divide(before.floor, before.floor - now.floor),
+                Direction::Retract => {
+                    let left = before.centre - tread.radius();
+                    between(divide(left, before.centre - now.centre), Q16::ZERO, Q16::ONE)
+                }
+            };
             let mix = |a: Q16, b: Q16| a + part * (b - a);
             self.position = mix(before.position, now.position);
             self.centre = mix(before.centre, now.centre);

@@ -75,24 +75,26 @@ impl Timing {
         self.speed_change(from - to) * mean
     }
 
-    /// Largest speed up to `most` from which the profile comes to `to` within this distance,
-    /// mm/s, to 1/128 of the range.
-    pub fn fastest_into(
+    /// The same from a speed that still rises with this acceleration: until that is taken back it
+    /// comes to a peak.
+    pub fn distance_to(
         &self,
-        distance: Millimetres,
+        from: MillimetresPerSecond,
+        acceleration: MillimetresPerSecond2,
         to: MillimetresPerSecond,
-        most: MillimetresPerSecond,
-    ) -> MillimetresPerSecond {
-        let (mut low, mut high) = (to, most.max(to));
-        for _ in 0..7 {
-            let middle = (low + high).half();
-            if self.brake_distance(middle, to) <= distance {
-                low = middle;
-            } else {
-                high = middle;
-            }
-        }
-        low
+    ) -> Millimetres {
+        let rising = acceleration.max(Q16::ZERO);
+        let until_peak = self.until_level(rising);
+        let peak = from + rising * until_peak.half();
+        peak * until_peak + self.brake_distance(peak, to)
+    }
+
+    /// Travel from this speed until full acceleration is reached, mm, and the time that it takes, s:
+    /// `v t + a t^2 / 6` with `t = a / j`.
+    pub fn build_up(&self, speed: MillimetresPerSecond) -> (Millimetres, Seconds) {
+        let time = self.build_up;
+        let sixth = self.acceleration * time * q16(166_667);
+        ((speed + sixth) * time, time)
     }
 
     /// Time in which the jerk reduces this acceleration to zero, s.
@@ -123,22 +125,6 @@ impl Timing {
 mod tests {
     use super::*;
     use proptest::prelude::*;
-
-    #[test]
-    fn from_the_fastest_speed_the_slower_one_is_reached_in_time() {
-        let timing = Timing::try_build(&Rig::prototype()).unwrap();
-        let (slow, most) = (q16(5_000_000), q16(30_000_000));
-        for distance in [0.0, 0.3, 1.0, 2.0, 5.0].map(Q16::from_num) {
-            let fast = timing.fastest_into(distance, slow, most);
-            assert!(timing.brake_distance(fast, slow) <= distance && fast >= slow && fast <= most);
-            // A hundredth of the range faster it is not.
-            let faster = fast + q16(250_000);
-            assert!(
-                faster > most || timing.brake_distance(faster, slow) > distance,
-                "{distance} {fast}"
-            );
-        }
-    }
 
     #[test]
     fn the_latency_covers_delay_and_lag() {

@@ -1,5 +1,4 @@
-//! The tread, rolled out: a viscoelastic ring over a step, in fixed point. The controller does not
-//! use it yet: it plans and learns by the reduced model.
+//! The tread, rolled out: a viscoelastic ring over a step, in fixed point.
 //!
 //! Elements lie along rays from the wheel's centre, 0.008 rad apart. A stride rolls the
 //! tread on by one of them. An element at depth d carries the pressure of the three-parameter

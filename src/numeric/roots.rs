@@ -16,7 +16,7 @@ const MIDDLE: u32 = 0xA000_0000;
 ///
 /// Error: 0 to 1.5 LSB too small. Source: Heron's step with [`inverse_sqrt_normalised`] in place
 /// of the division.
-pub const fn sqrt_fraction(x: u32) -> u32 {
+const fn sqrt_fraction(x: u32) -> u32 {
     let (shift, inverse) = inverse_sqrt_normalised(x);
     let m = x << shift;
     let root = upper(m, inverse << 1);
@@ -29,7 +29,7 @@ pub const fn sqrt_fraction(x: u32) -> u32 {
 /// The even shift that brings `x / 2^32` to `m` between a quarter and one, and `1 / sqrt(m)` in
 /// Q29, from 2^29 to 2^30, also for 0. Error: 1e-5 relative. Source: one step of Newton's
 /// iteration from [`inverse_sqrt_guess`].
-pub const fn inverse_sqrt_normalised(x: u32) -> (u32, u32) {
+const fn inverse_sqrt_normalised(x: u32) -> (u32, u32) {
     let (shift, guess) = inverse_sqrt_guess(x);
     // Q30, from 1 to 2, as is what follows from it.
     let (m, guess) = (x << shift, guess << 1);
@@ -39,7 +39,7 @@ pub const fn inverse_sqrt_normalised(x: u32) -> (u32, u32) {
 }
 
 /// The same within 0.22 %, relative. Source: a quartic of least relative error.
-pub const fn inverse_sqrt_guess(x: u32) -> (u32, u32) {
+const fn inverse_sqrt_guess(x: u32) -> (u32, u32) {
     let shift = (x | 1).leading_zeros() & !1;
     let t = (x << shift).wrapping_sub(MIDDLE) as i32;
     let [c0, c1, c2, c3, c4] = GUESS;

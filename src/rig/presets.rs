@@ -64,7 +64,7 @@ impl Rig {
             control: ControlSettings {
                 gap_ref_mm: 0.0,
                 safe_speed_mm_s: 5.0,
-                gap_reserve: 0.014,
+                gap_reserve: 0.0,
                 slip_margin: 0.10,
                 adaptation_range: 0.25,
                 adaptation_gain: 0.5,
@@ -83,7 +83,7 @@ impl Rig {
         rig.preload.spring_n_per_mm = 3.6;
         rig.preload.slew_n_per_s = 75.0;
         // At a third of the gap's range, the same tolerances weigh more.
-        rig.control.gap_reserve = 0.05;
+        rig.control.gap_reserve = 0.03;
         rig.drive.stall_force_n = 480.0;
         rig.drive.force_limit_n = 240.0;
         rig.drive.reflected_mass_kg = 120.0;

@@ -204,6 +204,13 @@ impl Rig {
         self.rig.wall_radius_mm - self.rig.step_height_mm * level as f64 - self.rig.wheel_radius_mm
     }
 
+    /// Axial distance of a corner from the centre at which the undeformed wheel touches it, mm.
+    pub fn corner_reach_mm(&self) -> f64 {
+        let (radius, above) =
+            (self.rig.wheel_radius_mm, self.rig.wheel_radius_mm - self.rig.step_height_mm);
+        libm::sqrt(radius * radius - above * above)
+    }
+
     /// Preload with which the wheel may roll along the wall, N: its tread carries load and
     /// carriage, not the inertia of the rotor behind it. A trailing arm presses it on besides,
     /// which is left as a reserve; what a leading one lifts it by counts. The limit where the

@@ -9,11 +9,13 @@ use super::liveness::TaskId;
 use crate::hal::{CommandSource, Indicator, Journal, Light, Line};
 use crate::log::LogEncoder;
 use crate::model::Planner;
+use crate::model::tread::TreadState;
 use crate::params::link::{FrameReader, ToBoard, ToHost, frame};
 use crate::params::service::{Request, Response, Service};
 use crate::params::slots::SetMemory;
 use crate::tick::{Entry, Event};
 use embassy_futures::select::{Either, select};
+use embassy_futures::yield_now;
 use embassy_time::{Duration, Timer, with_deadline};
 
 /// Polling interval of the line: the host writes without an interrupt.
@@ -22,12 +24,19 @@ const POLL: Duration = Duration::from_millis(10);
 /// Answers the tick's requests for a plan, below the control rate; of several requests meanwhile,
 /// the latest counts.
 pub async fn model(planner: &Planner, exchange: &Exchange) -> ! {
+    let mut tread = TreadState::default();
+    let pause = async || {
+        exchange.liveness.check_in(TaskId::Model, uptime());
+        yield_now().await;
+        exchange.liveness.running(TaskId::Model);
+    };
     loop {
         exchange.liveness.check_in(TaskId::Model, uptime());
         let request = with_deadline(mid_tick_deadline(ROUND), exchange.request.receive()).await;
         if let Ok(request) = request {
             exchange.liveness.running(TaskId::Model);
-            replace(&exchange.answer, planner.plan(&request));
+            let plan = planner.plan_pausing(&mut tread, &request, pause).await;
+            replace(&exchange.answer, plan);
         }
     }
 }

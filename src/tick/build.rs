@@ -2,11 +2,11 @@
 
 use super::Controller;
 use crate::control::preload_loop::{PreloadLoop, answer_s};
-use crate::control::profile::Profile;
 use crate::control::schedule::Schedule;
 use crate::control::speed_loop::SpeedLoop;
 use crate::estimate::Estimator;
 use crate::estimate::vibration::VibrationObserver;
+use crate::model::profile::Profile;
 use crate::numeric::checked;
 use crate::rig::{CLIMB_PART, Rig, RigError};
 use crate::sense::{Senses, Tuning};

@@ -29,9 +29,7 @@ impl Controller {
             remaining: steps.remaining(direction, estimate.position),
             critical: estimate.critical(),
             ramping: state.approach.ramping,
-            braking: state.approach.braking,
-            released: state.approach.released,
-            looking: state.approach.looking,
+            begun: state.approach.begun,
             speed: state.profile.speed(),
             acceleration: state.profile.acceleration(),
             reference: state.preload_loop.reference(tick.sensed.preload.value),
@@ -47,9 +45,7 @@ impl Controller {
             speed: Q16::ZERO,
             preload: state.preload_loop.reference(tick.sensed.preload.value),
             ramping: state.approach.ramping,
-            braking: state.approach.braking,
-            released: state.approach.released,
-            looking: state.approach.looking,
+            begun: state.approach.begun,
             approaching: false,
             waiting: false,
         };
@@ -58,16 +54,20 @@ impl Controller {
             Mode::Run(direction, _) => (direction, true),
             _ => return hold,
         };
-        let Some(plan) = state.planning.plan.as_ref() else { return hold };
+        let Some(plan) = state.planning.plan.as_ref() else {
+            // Any plan rolls with this.
+            let least = if running { Q16::ZERO } else { self.rolling_preload };
+            let preload = hold.preload.max(least);
+            return Targets { preload, ..hold };
+        };
         let course = self.course(state, tick, direction);
         let mut targets = self.schedule.targets(self.estimator.steps(), plan, &course);
         let (step, cross_speed) = (plan.step, plan.cross_speed);
         let (cross_preload, ramp_preload) = (plan.cross_preload, plan.ramp_preload);
         let most_preload = plan.most_preload;
+        let needs = plan.brake_horizon + plan.approach.window_from.abs();
         state.approach.ramping = targets.ramping;
-        state.approach.braking = targets.braking;
-        state.approach.released = targets.released;
-        state.approach.looking = targets.looking;
+        state.approach.begun = targets.begun;
         if !running {
             targets.speed = Q16::ZERO;
             return targets;
@@ -76,9 +76,14 @@ impl Controller {
         self.take_findings(state, tick, found);
         self.limit_climb(state, &mut targets);
         let surprised = state.estimate.slow_down();
-        if surprised || step != state.estimate.next_step {
-            targets.speed = targets.speed.min(cross_speed);
+        let unplanned = step != state.estimate.next_step;
+        if surprised || unplanned {
             targets.preload = if surprised { cross_preload } else { ramp_preload };
+        }
+        // Without its plan a step that is near is come to as the last one was crossed.
+        let near = self.estimator.distance(&state.estimate).is_some_and(|ahead| ahead <= needs);
+        if surprised || unplanned && near {
+            targets.speed = targets.speed.min(cross_speed);
         }
         state.approach.sped_up &= !state.estimate.critical();
         if let Some(speed) = state.estimate.lifting()

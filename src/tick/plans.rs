@@ -13,6 +13,9 @@ use crate::units::{Direction, Millimetres, Newtons, Seconds, Tick, q16, ticks_to
 const WAIT_TICKS: u32 = 100;
 /// Slip on a corner that ends a run for want of friction, mm: twice what a measured one is off by.
 const SURE_SLIP: Millimetres = q16(1_000_000);
+/// Ticks from a request until its answer counts: longer than a plan takes on the board, and the same on
+/// any core, so that a run is the same.
+const PLAN_TICKS: u32 = 250;
 /// Ticks within which the model task must answer.
 const ANSWER_TICKS: u32 = 500;
 
@@ -22,6 +25,7 @@ impl Controller {
         let (planning, estimate) = (&mut state.planning, &state.estimate);
         planning.sequence = planning.sequence.wrapping_add(1);
         planning.asked = 1;
+        planning.answer = None;
         if planning.plan.as_ref().is_some_and(|plan| plan.direction != estimate.direction) {
             planning.plan = None;
         }
@@ -45,8 +49,22 @@ impl Controller {
         plan: Option<&Plan>,
     ) {
         let planning = &mut state.planning;
-        let Some(plan) = plan.filter(|plan| plan.sequence == planning.sequence) else {
-            self.await_answer(state, tick);
+        if let Some(plan) = plan.filter(|plan| plan.sequence == planning.sequence) {
+            planning.answer = Some(*plan);
+        }
+        if planning.asked == 0 {
+            return;
+        }
+        planning.asked += 1;
+        if planning.asked <= PLAN_TICKS {
+            return;
+        }
+        let Some(plan) = planning.answer.take() else {
+            let waits = matches!(state.mode, Mode::Preload(_) | Mode::Run(..));
+            if planning.asked > ANSWER_TICKS && waits {
+                planning.asked = 0;
+                tick.fail(Fault::ModelSilent);
+            }
             return;
         };
         planning.asked = 0;
@@ -58,9 +76,6 @@ impl Controller {
         }
         if let Some(outcome) = plan.outcome.as_ref() {
             planning.learned = outcome.learned;
-            // What a crossing has shown counts for more than what the tread showed before.
-            let trusted = planning.review.is_some_and(|review| review.trusted);
-            planning.learned.unknown &= !trusted || outcome.strange || outcome.wide;
             if outcome.bounded {
                 tick.log(Event::Limit(Limit::AdaptationBounded));
             }
@@ -75,24 +90,12 @@ impl Controller {
                 record(tick, &open, outcome);
             }
         }
-        planning.plan = Some(*plan);
+        planning.plan = Some(plan);
         planning.slipped = None;
         planning.learned.slips = plan.slips;
         let sure = planning.lost > SURE_SLIP;
         if plan.short && sure && matches!(state.mode, Mode::Run(Direction::Deploy, _)) {
             tick.fail(Fault::FrictionShort);
-        }
-    }
-
-    fn await_answer(&self, state: &mut State, tick: &mut TickContext<'_>) {
-        let asked = &mut state.planning.asked;
-        if *asked == 0 {
-            return;
-        }
-        *asked += 1;
-        if *asked > ANSWER_TICKS && matches!(state.mode, Mode::Preload(_) | Mode::Run(..)) {
-            *asked = 0;
-            tick.fail(Fault::ModelSilent);
         }
     }
 
@@ -157,10 +160,8 @@ fn lead_time(open: &OpenCrossing, lifted_at: Tick) -> Seconds {
 mod tests {
     use super::super::tests::{sensed, within};
     use super::*;
-    use crate::model::{Learned, Planner, Review};
-    use crate::rig::Rig;
+    use crate::model::approach::Begun;
     use crate::supervise::Leg;
-    use crate::units::Q16;
 
     /// In motion on the first wall.
     fn running() -> State {
@@ -201,9 +202,7 @@ mod tests {
             speed: q16(1_000_000),
             preload: q16(48_000_000),
             ramping: true,
-            looking: true,
-            braking: true,
-            released: false,
+            begun: Begun { looking: true, braking: true, released: false },
             approaching: true,
             waiting: true,
         };
@@ -221,44 +220,6 @@ mod tests {
             controller.transit(&mut state, pass);
         });
         assert_eq!(state.mode, Mode::FaultHold(Fault::PreloadNotReached));
-    }
-
-    #[test]
-    fn a_trusted_crossing_clears_what_the_tread_showed_before_it() {
-        let planner = Planner::try_build(&Rig::prototype()).expect("sound");
-        let review = Review {
-            direction: Direction::Deploy,
-            speed: q16(8_000_000),
-            preload: q16(45_000_000),
-            tan_arm: Q16::ONE,
-            gap: Q16::ZERO,
-            seen: Q16::ZERO,
-            trusted: false,
-            slipped: false,
-        };
-        let answer = |review: Review| {
-            planner.plan(&PlanRequest {
-                sequence: 1,
-                direction: Direction::Deploy,
-                step: 2,
-                learned: Learned { unknown: true, ..Learned::default() },
-                preload: q16(50_000_000),
-                distance: q16(20_000_000),
-                review: Some(review),
-                slipped: None,
-            })
-        };
-        let gap = answer(review).outcome.expect("a review").gap_predicted;
-        for trusted in [false, true] {
-            let review = Review { gap, trusted, ..review };
-            let mut state = running();
-            (state.planning.sequence, state.planning.learned.unknown) = (1, true);
-            state.planning.review = Some(review);
-            within(&sensed(0, 0.0, 0.3), |controller, pass| {
-                controller.take_plan(&mut state, pass, Some(&answer(review)));
-            });
-            assert_eq!(state.planning.learned.unknown, !trusted);
-        }
     }
 
     #[test]

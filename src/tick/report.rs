@@ -26,15 +26,17 @@ impl Controller {
             tick.log(Event::Slip(slip));
         }
         if found.advanced {
-            let sped_up = state.approach.released && state.estimate.lifting().is_some();
+            let sped_up = state.approach.begun.released && state.estimate.lifting().is_some();
             state.approach = Approach { sped_up, ..Approach::default() };
         }
         if let Some((open, plausible)) = found.closed {
             state.planning.closed = Some(open);
             state.planning.review = open.lift.map(|point| Review {
                 direction: open.direction,
-                speed: point.speed,
-                preload: point.remembered,
+                history: point.history,
+                distance: point.distance,
+                held: point.held,
+                felt_at: open.felt.map(|_| open.felt_at),
                 tan_arm: point.tan_arm,
                 gap: point.gap,
                 seen: open.gap,
@@ -72,8 +74,10 @@ impl Controller {
         let stiffer = learned.scale == Q16::ONE && stiffness > Q16::ONE;
         if stiffer {
             learned.scale = stiffness;
-            learned.deviation = SHOWN_DEVIATION;
-            learned.unknown |= stiffness > KNOWN_SCALE;
+            if stiffness > KNOWN_SCALE {
+                learned.deviation = SHOWN_DEVIATION;
+                learned.unknown = true;
+            }
         }
         reloaded != Q16::ZERO || stiffer
     }

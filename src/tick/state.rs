@@ -1,11 +1,12 @@
 //! State of the controller between ticks.
 
 use crate::control::preload_loop::PreloadLoopState;
-use crate::control::profile::ProfileState;
 use crate::control::speed_loop::SpeedLoopState;
 use crate::estimate::crossing::Contact;
 use crate::estimate::vibration::VibrationTracking;
 use crate::estimate::{ContactStage, EstimateState, OpenCrossing, Place, PositionConfidence};
+use crate::model::approach::Begun;
+use crate::model::profile::ProfileState;
 use crate::model::{Learned, Plan, Review};
 use crate::sense::{SensesState, Zeros};
 use crate::supervise::service::ServiceState;
@@ -45,13 +46,9 @@ pub struct State {
 pub(super) struct Approach {
     /// The preload is being raised for the step.
     pub ramping: bool,
-    /// The speed is being brought down for the window of the step.
-    pub looking: bool,
-    /// The speed is being brought down for the step.
-    pub braking: bool,
-    /// The wheel speeds up again on the corner.
-    pub released: bool,
-    /// It did so on the corner behind, before it lifted off.
+    /// What of the plan's approach has begun.
+    pub begun: Begun,
+    /// The wheel sped up on the corner behind, before it lifted off.
     pub sped_up: bool,
     /// Time since which the crossing preload is reached.
     pub standing_since: Option<Tick>,
@@ -65,6 +62,8 @@ pub(super) struct Approach {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Planning {
     pub plan: Option<Plan>,
+    /// Answer to the newest request, until it counts.
+    pub answer: Option<Plan>,
     /// Sequence of the newest request.
     pub sequence: u32,
     /// Ticks for which it has waited for its answer, from 1; 0 if answered.

@@ -6,6 +6,7 @@ use crate::control::schedule::Targets;
 use crate::estimate::ContactStage;
 use crate::estimate::crossing::Contact;
 pub(super) use crate::estimate::sensed;
+use crate::model::approach::Begun;
 use crate::rig::Rig;
 use crate::sense::Validity;
 use crate::sense::raw::{BridgeCode, BridgeCodes};
@@ -111,9 +112,7 @@ fn only_on_a_corner_the_climb_limits_the_speed() {
             speed: fast,
             preload: Q16::ZERO,
             ramping: false,
-            looking: true,
-            braking: false,
-            released: false,
+            begun: Begun { looking: true, ..Begun::default() },
             approaching: false,
             waiting: false,
         };

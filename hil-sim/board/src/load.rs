@@ -16,7 +16,7 @@ const PERIOD: u64 = HZ / 1000;
 const TICK: &str = "motors";
 /// Largest mean load: what the flash's waits may at worst make five times of it (four wait states
 /// at every cycle) leaves more than two fifths of the core.
-const LOAD: f64 = 0.11;
+const LOAD: f64 = 0.25;
 /// Largest control tick, with waits where they are counted, as a part of its period. The tick
 /// begins with its millisecond; another one as long, of lower priority or of the sensors, still
 /// ends before the host and the model have their turn in its middle.

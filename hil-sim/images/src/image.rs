@@ -1,6 +1,6 @@
 //! Start, panic and the list of what can be called.
 
-mod model;
+mod rollout;
 mod slot;
 mod tick;
 
@@ -13,13 +13,8 @@ use embassy_stm32 as _;
 fn main() -> ! {
     // Keeps what only the host calls.
     core::hint::black_box([
-        model::model_build as *const (),
-        model::fixed_forward as *const (),
-        model::fixed_inverse as *const (),
-        model::f32_forward as *const (),
-        model::f32_inverse as *const (),
-        model::f64_forward as *const (),
-        model::f64_inverse as *const (),
+        rollout::model_build as *const (),
+        rollout::rollout as *const (),
         tick::tick_build as *const (),
         tick::tick_skip_nothing as *const (),
         tick::tick_load as *const (),

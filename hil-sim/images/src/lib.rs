@@ -1,13 +1,12 @@
 //! What the host and the measurement image exchange: plain words in one memory, in the
 //! order in which they are declared.
 //!
-//! # Reduced model
+//! # Rollout
 //!
 //! 1. The host calls `model_build(preset)` of the image, with a [`tick::Preset`] as `u32`;
-//!    it returns 1 if the models of all arithmetics are ready.
-//! 2. For each of [`model::VARIANTS`] the host calls the functions `forward` and `inverse`
-//!    once for each of [`model::points`], with [`model::Given::words`] given by reference. A
-//!    function returns its answer as bits of Q15.16.
+//!    it returns 1 if the tread is ready.
+//! 2. For each crossing it calls `rollout`, with [`rollout::Given::words`] given by reference,
+//!    which returns the gap as bits of Q15.16.
 //!
 //! The host has `rig-board cycles --script FILE` do this: a JSON array of steps
 //! `{"call": {"function": .., "arguments": [..]}}` and
@@ -23,6 +22,5 @@
 #![no_std]
 
 pub mod digest;
-pub mod model;
-pub mod number;
+pub mod rollout;
 pub mod tick;

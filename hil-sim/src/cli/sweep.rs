@@ -6,12 +6,13 @@ use interstage::units;
 use serde_json::{Map, Value, json};
 
 use super::campaign::CampaignArgs;
-use super::crossing::{CrossingSetup, Method};
+use super::crossing::{Method, check, compute};
 use super::failure::{Failure, Outcome};
 use super::output;
 use super::scenario::RunArgs;
 use crate::campaign::{Campaign, Column, Frame, column};
 use crate::files::{make_directory, vacant_for, write_text};
+use crate::rollout::CrossingSetup;
 use crate::scenario::{Direction, Scenario};
 use crate::session::{self, Options};
 use crate::sweep::{self, Axis, MOST, Plot};
@@ -169,19 +170,14 @@ impl Point {
             },
             load_n: args.driven.then_some(loads.top_load_n * loads.top_load_share),
         };
-        setup.check(["--key speed_mm_s", "--key preload_n"])?;
+        check(&setup, ["--key speed_mm_s", "--key preload_n"])?;
         Ok(Self { scenario, crossing: Some(setup) })
     }
 
     /// What is found here.
     fn found(&self, method: Method) -> Result<Row, Failure> {
         let found = match &self.crossing {
-            Some(setup) => {
-                let (figures, outside) = setup.compute(method, &self.scenario)?;
-                let mut found = json!(figures);
-                found["in_range"] = outside.is_empty().into();
-                found
-            }
+            Some(setup) => json!(compute(setup, method, &self.scenario)?),
             None => {
                 let summary = session::run(&self.scenario, Options::default())?.summary;
                 let over_ref = summary.max_gap_mm / summary.gap_ref_mm;
@@ -223,7 +219,6 @@ fn of_crossing(is_driven: bool) -> Measure {
         column("corner_force_n", "corner", "N", 2),
         column("embedding_mm", "embedding", "mm", 3),
         column("climb_work_mj", "work", "mJ", 1),
-        column("in_range", "in range", "", 0),
         column("mu_needed", "friction\nneeded", "", 3),
     ];
     let plot = |column, title, y_name| Plot { column, title, y_name };
@@ -234,7 +229,7 @@ fn of_crossing(is_driven: bool) -> Measure {
     if is_driven {
         plots.push(plot("mu_needed", "Friction needed", "friction"));
     }
-    Measure { columns: if is_driven { COLUMNS } else { &COLUMNS[..5] }, plots }
+    Measure { columns: if is_driven { COLUMNS } else { &COLUMNS[..4] }, plots }
 }
 
 fn write(

@@ -58,9 +58,9 @@ pub struct Point {
     pub wall_ns: f64,
 }
 
-/// The crossings that the error is measured on: both loads and directions, pushed and
-/// driven.
-fn cases() -> Vec<(f64, f64, Axial)> {
+/// The crossings that the error is measured on: speed, negative on retraction, preload and load.
+#[must_use]
+pub fn cases() -> Vec<(f64, f64, Axial)> {
     let mut all = Vec::new();
     for (speed, preload) in [(5.0, 100.0), (8.0, 40.0), (25.0, 60.0)] {
         for axial in [Axial::Pushed, Axial::Driven(6.7)] {
@@ -70,7 +70,13 @@ fn cases() -> Vec<(f64, f64, Axial)> {
     all
 }
 
-fn case(rig: &Rig, setting: Setting, (speed, preload, axial): (f64, f64, Axial)) -> CrossingCase {
+/// One of them at a setting.
+#[must_use]
+pub fn case(
+    rig: &Rig,
+    setting: Setting,
+    (speed, preload, axial): (f64, f64, Axial),
+) -> CrossingCase {
     CrossingCase {
         ring: RingParameters::of(rig, setting.elements),
         step_height_mm: rig.rig.step_height_mm,

@@ -30,7 +30,7 @@ pub struct LedgerLine {
     pub peak_preload_n: f64,
     /// Largest tread compression, mm.
     pub compression_mm: f64,
-    /// Gap by the reduced model, mm.
+    /// Gap by the model, mm.
     pub gap_predicted_mm: f64,
     /// Gap measured from compression and arm angle, mm.
     pub gap_measured_mm: f64,

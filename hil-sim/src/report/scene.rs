@@ -1,13 +1,13 @@
 //! What the animation of a run shows: geometry of the rig, events of the crossings and the
 //! run's own rows, thinned.
 
-use interstage::model::formula::Formula;
 use interstage::rig::Rig;
 use interstage::units::Direction;
 use serde::Serialize;
 use serde_json::{Map, Value};
 
 use crate::record::{CrossingLine, Recording, Tick};
+use crate::rollout::{CrossingSetup, Wheel};
 use crate::scenario::Scenario;
 
 /// Rows kept of a crossing's surroundings, at most.
@@ -153,7 +153,7 @@ pub(super) struct Event {
     pub(super) preload_n: f64,
     /// Gap, mm: true, or measured where there is no truth.
     pub(super) gap_mm: f64,
-    /// Gap at that speed with the preload of the smooth wall, by the reduced model, mm.
+    /// Gap at that speed with the preload of the smooth wall, by the model, mm.
     pub(super) gap_at_cruise_mm: f64,
 }
 
@@ -170,8 +170,10 @@ impl Scene {
         let geometry = Geometry::new(&scenario.rig, &drawn);
         let retracts = summary.direction == "retract";
         let direction = if retracts { Direction::Retract } else { Direction::Deploy };
-        let model = (Formula::new(&scenario.rig), direction, load_n(&scenario.rig));
-        let event = |line: &CrossingLine| event(&geometry, &rows, line, &model);
+        let wheel = Wheel::try_build(&scenario.rig).ok()?;
+        let load_n = Some(load_n(&scenario.rig));
+        let setup = CrossingSetup { speed_mm_s: 0.0, preload_n: 0.0, direction, load_n };
+        let event = |line: &CrossingLine| event(&geometry, &rows, line, (&wheel, setup));
         let crossings: Vec<Event> = summary.crossings.iter().map(event).collect();
         let rows = thinned(&rows, &crossings);
         let rows = rows.into_iter().map(|row| values(&geometry, row)).collect();
@@ -195,7 +197,7 @@ fn event(
     geometry: &Geometry,
     rows: &[&Tick],
     line: &CrossingLine,
-    (model, direction, load_n): &(Formula, Direction, f64),
+    (wheel, setup): (&Wheel, CrossingSetup),
 ) -> Event {
     let at = rows.partition_point(|row| row.controller.t_s < line.touch_s).min(rows.len() - 1);
     let compression_mm = compression_mm(rows[at]);
@@ -203,8 +205,12 @@ fn event(
     let gap_mm = gap_mm.unwrap_or(f64::NAN);
     // The model is held to the run's own gap; then the preload above the smooth wall's is taken
     // away.
-    let force_n = model.force_n(*direction, line.speed_mm_s, gap_mm, Some(*load_n));
-    let less_n = force_n - (line.preload_n - geometry.cruise_n);
+    let setup = CrossingSetup { speed_mm_s: line.speed_mm_s, ..setup };
+    let known = gap_mm.is_finite().then(|| wheel.force_n(gap_mm, &setup));
+    let at_cruise = known.and_then(|force_n| {
+        let preload_n = force_n - (line.preload_n - geometry.cruise_n);
+        wheel.cross(&CrossingSetup { preload_n, ..setup })
+    });
     let step_mm = geometry.step_mm(line.step_mm);
     Event {
         index: line.index,
@@ -218,11 +224,7 @@ fn event(
         speed_mm_s: line.speed_mm_s,
         preload_n: line.preload_n,
         gap_mm,
-        gap_at_cruise_mm: if less_n > 0.0 {
-            model.gap_mm(*direction, line.speed_mm_s, less_n, Some(*load_n))
-        } else {
-            f64::NAN
-        },
+        gap_at_cruise_mm: at_cruise.map_or(f64::NAN, |crossed| crossed.gap_mm),
     }
 }
 

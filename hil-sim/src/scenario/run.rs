@@ -58,7 +58,7 @@ impl From<Direction> for interstage::units::Direction {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum ControllerKind {
-    /// Preload raised ahead of each step by the reduced model.
+    /// Preload raised ahead of each step by the plan.
     #[default]
     Scheduled,
     /// Cruise preload throughout, at the largest speed that it allows.

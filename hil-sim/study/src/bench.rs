@@ -1,13 +1,13 @@
-//! Run time against error: the reduced model in three number formats, the plant's
-//! resolution, and other engines and solvers on one identical crossing.
+//! Run time against error: the rolled-out tread, the plant's resolution, and other engines and
+//! solvers on one identical crossing.
 //!
 //! Times are processor time of one thread, the least of several runs from the same state.
 //! They depend on the machine; errors and cycles do not.
 
 pub mod cycles;
-pub mod model;
 pub mod page;
 pub mod peers;
+pub mod rollout;
 
 use std::hint::black_box;
 
@@ -19,8 +19,8 @@ use serde::Serialize;
 use hil_sim::plant::precision::{FINER, Point, Setting, work_precision};
 
 use cycles::Tick;
-use model::Variant;
 use peers::Peers;
+use rollout::Variant;
 
 /// Repeats of a crossing; the fastest counts.
 const REPEATS: usize = 5;
@@ -37,7 +37,7 @@ pub struct Options {
 /// Everything that was measured.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Report {
-    /// The reduced model, the shipping variant first.
+    /// The rolled-out tread.
     pub variants: Vec<Variant>,
     /// The control tick on the emulated core, if it was measured.
     pub tick: Option<Tick>,
@@ -71,13 +71,13 @@ impl Plant {
 /// Measures; `say` is called with each part's name.
 pub fn measure(options: Options, say: &dyn Fn(&str)) -> Result<Report> {
     let one_line = |error: &anyhow::Error| Some(format!("{error:#}").replace('\n', " "));
-    say("reduced model");
-    let mut variants = model::measure()?;
+    say("rollout");
+    let mut variants = rollout::measure()?;
     let (tick, cycles_left_out) = if options.cycles {
         say("cycles");
         match cycles::run() {
             Ok((calls, tick)) => {
-                cycles::fill(&calls, &mut variants)?;
+                rollout::fill(&calls, &mut variants)?;
                 (Some(tick), None)
             }
             Err(error) => (None, one_line(&error)),

@@ -1,9 +1,8 @@
 //! The published study beside the virtual rig: its models in corrected form, its figures
-//! and claims, the fit of the constants, and run time against error.
+//! and claims, and run time against error.
 
 pub mod bench;
 pub mod cli;
-pub mod constants;
 pub mod figure;
 pub mod figure_svg;
 pub mod model_figures;

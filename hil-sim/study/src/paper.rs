@@ -1,5 +1,5 @@
 //! The study's results, regenerated: every figure that its text describes, as theory
-//! (the reduced model), simulation (the reference models) and experiment (the virtual
+//! (the controller's model), simulation (the reference models) and experiment (the virtual
 //! rig, forty runs and four means of ten), with the numbers that it prints as marks, and
 //! every claim of it judged by these data.
 //!

@@ -8,7 +8,7 @@ use hil_sim::plant::precision::{FINER, Setting, work_precision};
 use hil_sim::plant::ring::RingParameters;
 use interstage::rig::Rig;
 use rig_study::bench::peers::Peers;
-use rig_study::bench::{cycles, model};
+use rig_study::bench::{cycles, rollout};
 use serde_json::Value;
 
 fn rig(arguments: &[&str]) -> Output {
@@ -29,14 +29,11 @@ fn a_quick_measurement_prints_one_object_with_its_keys() {
     for key in ["variants", "tick", "plant", "peers"] {
         assert!(object.get(key).is_some(), "{key}");
     }
-    for (variant, name) in
-        object["variants"].as_array().unwrap().iter().zip(["fixed", "f32", "f64"])
-    {
-        assert_eq!(variant["name"], name);
-        let number = |key: &str| variant[key].as_f64().unwrap();
-        assert!(number("max_rel_error") >= number("rms_rel_error") && number("host_ns") > 0.0);
-        assert!(variant["cycles"].is_null(), "{variant}");
-    }
+    let variants = object["variants"].as_array().unwrap();
+    assert!(variants.len() == 1 && variants[0]["name"] == "rollout", "{variants:?}");
+    let number = |key: &str| variants[0][key].as_f64().unwrap();
+    assert!(number("max_rel_error") >= number("rms_rel_error") && number("host_ns") > 0.0);
+    assert!(variants[0]["cycles"].is_null(), "{variants:?}");
     let settings = object["plant"]["settings"].as_array().unwrap();
     let [coarse, usual] = &settings[..] else { panic!("two resolutions: {settings:?}") };
     let number = |point: &Value, key: &str| point[key].as_f64().unwrap();
@@ -45,15 +42,14 @@ fn a_quick_measurement_prints_one_object_with_its_keys() {
 }
 
 #[test]
-fn the_shipping_model_costs_less_than_550_cycles_and_answers_as_on_the_host() {
+fn a_rollout_answers_on_the_core_as_on_the_host() {
     if !super::long() {
         return;
     }
     let (calls, _) = cycles::run().unwrap();
-    let mut variants = model::measure().unwrap();
-    cycles::fill(&calls, &mut variants).unwrap();
-    let fixed = &variants[0];
-    assert!(fixed.forward.cycles.unwrap() <= 550 && fixed.inverse.cycles.unwrap() <= 350);
+    let mut variants = rollout::measure().unwrap();
+    rollout::fill(&calls, &mut variants).unwrap();
+    assert!(variants[0].cycles.unwrap() > 10_000, "{variants:?}");
 }
 
 /// The ring of today gives the crossing that SciPy's solvers found.

@@ -3,9 +3,9 @@
 
 use super::parity;
 use interstage::control::preload_loop::{PreloadLoop, PreloadLoopState};
-use interstage::control::profile::{Profile, ProfileState};
 use interstage::control::speed_loop::{SpeedLoop, SpeedLoopState};
 use interstage::estimate::vibration::{VibrationObserver, VibrationState};
+use interstage::model::profile::{Profile, ProfileState};
 use interstage::numeric::{LowPass, LowPassState};
 use interstage::rig::Rig;
 use interstage::sense::raw::{

@@ -158,7 +158,7 @@ fn merged_parts_are_what_one_machine_prints_to_the_bit() {
         "faults --clean 3",
         "stress --cases 40",
         "envelope -n 2x2 --no-files",
-        "sweep --no-files --crossing --method reduced --key speed_mm_s=5,8,9",
+        "sweep --no-files --crossing --method fixed --key speed_mm_s=5,8,9",
         "compare -n 1 --no-oracle",
     ] {
         let directory = tempfile::tempdir().unwrap();

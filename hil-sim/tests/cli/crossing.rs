@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use super::{good, number, object, rig, stderr, stdout};
+use super::{good, number, object, refused, rig, stderr, stdout};
 
 /// A crossing on the study's rig.
 fn crossing(speed: f64, preload: f64, more: &[&str]) -> Value {
@@ -24,7 +24,7 @@ fn every_method_prints_the_same_keys_and_the_gap_that_the_ring_was_fitted_to() {
     assert_close(gap(5.0, 100.0, &[]), 1.743, 5e-3);
     for more in [&[][..], &["--driven"], &["--driven", "--retract"]] {
         let ring = gap(5.0, 100.0, more);
-        for method in ["ring", "reduced", "fixed"] {
+        for method in ["ring", "fixed"] {
             let value = crossing(5.0, 100.0, &[more, &["--method", method]].concat());
             assert_eq!(value["method"], method);
             assert_eq!((number(&value, "speed_mm_s"), number(&value, "preload_n")), (5.0, 100.0));
@@ -58,31 +58,24 @@ fn driving_takes_the_published_friction_and_widens_the_gap() {
 
 #[test]
 fn a_wheel_that_sinks_in_has_no_gap_and_exits_with_one() {
-    let output = rig(&["crossing", "--speed-mm-s", "5", "--preload-n", "1000", "--json"]);
-    assert_eq!(output.status.code(), Some(1));
-    assert!(output.stdout.is_empty());
-    let text = stderr(&output);
-    assert!(text.starts_with("error: ") && text.contains("no gap"), "{text}");
+    let asked = ["crossing", "--speed-mm-s", "5", "--preload-n", "1000", "--json"];
+    for method in ["ring", "fixed"] {
+        let output = rig(&[&asked[..], &["--method", method]].concat());
+        assert_eq!(output.status.code(), Some(1), "{method}");
+        assert!(output.stdout.is_empty());
+        let text = stderr(&output);
+        assert!(text.starts_with("error: ") && text.contains("no gap"), "{text}");
+    }
 }
 
 #[test]
-fn an_answer_outside_the_fit_says_so() {
-    for (speed, preload, fits) in
-        [(5.0, 100.0, true), (5.0, 300.0, false), (5.0, 1000.0, false), (150.0, 100.0, false)]
+fn the_reduced_model_is_refused_and_the_methods_that_there_are_named() {
+    for verb in
+        [&["crossing", "--speed-mm-s", "5", "--preload-n", "33"][..], &["sweep", "--crossing"]]
     {
-        for method in ["reduced", "fixed"] {
-            let value = crossing(speed, preload, &["--method", method]);
-            assert_eq!(value["in_range"], fits, "{speed} {preload} {method}");
-            assert!(number(&value, "gap_mm") > 0.0);
-        }
+        let asked = [verb, &["--method", "reduced"]].concat();
+        refused(&asked, &["--method reduced", "gone", "ring or fixed"]);
     }
-    // The ring has no range.
-    assert_eq!(crossing(150.0, 100.0, &[])["in_range"], true);
-    let asked = ["crossing", "--speed-mm-s", "5", "--preload-n", "300", "--method", "reduced"];
-    let text = stdout(&rig(&asked)).to_owned();
-    assert!(text.contains("Out of the range") && text.contains("preload 300"), "{text}");
-    let text = stdout(&rig(&["crossing", "--speed-mm-s", "5", "--preload-n", "100"])).to_owned();
-    assert!(!text.contains("range"), "{text}");
 }
 
 #[test]

@@ -122,7 +122,7 @@ fn a_crossing_has_a_range_of_speed_and_preload() {
     refused(&["crossing", "--speed-mm-s", "5"], &["--preload-n"]);
     refused(
         &["crossing", "--speed-mm-s", "5", "--preload-n", "33", "--method", "magic"],
-        &["--method", "ring, reduced, fixed"],
+        &["--method", "ring, fixed"],
     );
     refused(
         &["crossing", "--speed-mm-s", "5", "--preload-n", "33", "--set", "tread.tau_s=0"],

@@ -46,18 +46,18 @@ fn a_grid_of_deployments_has_rows_table_and_picture() {
 fn a_crossing_is_swept_as_it_is_computed_alone() {
     let directory = tempfile::tempdir().unwrap();
     let at = directory.path();
-    let arguments = "sweep --crossing --method reduced --no-files --json --key speed_mm_s=5,8 \
+    let arguments = "sweep --crossing --method fixed --no-files --json --key speed_mm_s=5,8 \
                      --key preload_n=33.3,50";
     let found = object(&rig_in(at, &arguments.split_whitespace().collect::<Vec<_>>()));
     let rows = found["rows"].as_array().unwrap();
     assert_eq!(rows.len(), 4);
-    let alone = "crossing --method reduced --speed-mm-s 8 --preload-n 50 --json";
+    let alone = "crossing --method fixed --speed-mm-s 8 --preload-n 50 --json";
     let alone = object(&rig_in(at, &alone.split(' ').collect::<Vec<_>>()));
-    for key in ["gap_mm", "corner_force_n", "embedding_mm", "in_range"] {
+    for key in ["gap_mm", "corner_force_n", "embedding_mm"] {
         assert_eq!(rows[3][key], alone[key], "{key}");
     }
     // Without keys: gap against speed at cruise preload and at the limit.
-    let arguments = ["sweep", "--crossing", "--method", "reduced", "--json"];
+    let arguments = ["sweep", "--crossing", "--method", "fixed", "--json"];
     let usual = object(&rig_in(at, &arguments));
     let rows = usual["rows"].as_array().unwrap();
     assert_eq!(rows.len(), 30);

@@ -1,15 +1,15 @@
 //! From a rig to the planner's machine units, once at start.
 
-use super::Planner;
-use crate::model::dip::Dip;
-use crate::model::formula::Formula;
+use super::{DriveModel, Planner, PretightenerModel};
 use crate::model::guard::Guard;
-use crate::model::plan::{KNOWN_DEVIATION, Strategy};
-use crate::model::reduced::{ReducedModel, Scale};
-use crate::model::timing::Timing;
+use crate::model::plan::Strategy;
+use crate::model::profile::Profile;
+use crate::model::rollout::{Run, roll};
+use crate::model::timing::{SLEW_PART, Timing};
+use crate::model::tread::{Axial, Tread, TreadState};
 use crate::numeric::checked;
-use crate::rig::{MAX_STEPS, Rig, RigError};
-use crate::units::{Direction, Millimetres, Ratio};
+use crate::rig::{CROSSOVER_RAD_S, MAX_STEPS, PROPORTIONAL, Rig, RigError};
+use crate::units::{Direction, Millimetres, MillimetresPerSecond, Newtons, Q16, Ratio};
 
 /// Rise and dip of the wheel at which a corner shows its place, mm.
 const RISE_MM: f64 = 0.16;
@@ -18,8 +18,10 @@ const DIP_MM: f64 = 1.0;
 /// How much farther the stiffness estimate may rise than fall.
 const STIFFER_RANGE: f64 = 10.0;
 
-/// Reserve below which the crossings do not change it.
-const LEAST_RESERVE: f64 = 1e-3;
+/// Where the rollout of a steady crossing begins and ends, over the wheel's radius: a patch before the
+/// corner and behind it.
+const STEADY_REACH: Millimetres = Millimetres::ONE;
+
 impl Planner {
     /// The scheduler of a rig.
     pub fn try_build(rig: &Rig) -> Result<Self, RigError> {
@@ -28,7 +30,7 @@ impl Planner {
 
     /// The scheduler of a rig with one of the strategies it is compared with.
     pub fn try_build_as(rig: &Rig, strategy: Strategy) -> Result<Self, RigError> {
-        let model = ReducedModel::try_build(rig)?;
+        let tread = Tread::try_build(rig)?;
         let load = rig.plant.top_load_n * rig.plant.top_load_share;
         let tangents = (0..rig.rig.step_positions_mm.len()).map(|level| {
             let sine =
@@ -40,39 +42,41 @@ impl Planner {
             .collect::<Result<heapless::Vec<_, MAX_STEPS>, _>>()?;
         let first = tangents.first().map_or(0.0, |tangent: &Ratio| tangent.to_num::<f64>());
         let first = rig.plant.arm_coupling * load * first;
-        let formula = Formula::new(rig);
-        let reference = |direction| {
+        let load_n = checked("plant.top_load_n", load)?;
+        let gap_ref = [Direction::Deploy, Direction::Retract].map(|direction| {
             if rig.control.gap_ref_mm > 0.0 {
-                rig.control.gap_ref_mm
-            } else {
-                let speed = rig.control.safe_speed_mm_s;
-                formula.gap_mm(direction, speed, rig.preload.cruise_n + first, Some(load))
+                return checked("control.gap_ref_mm", rig.control.gap_ref_mm);
             }
-        };
-        let references = [reference(Direction::Deploy), reference(Direction::Retract)];
-        let gap = |value: f64| checked("control.gap_ref_mm", value);
-        let reserve = rig.control.gap_reserve;
+            let speed = checked("control.safe_speed_mm_s", rig.control.safe_speed_mm_s)?;
+            let force = checked("preload.cruise_n", rig.preload.cruise_n + first)?;
+            Ok(steady_gap(&tread, direction, load_n, speed, force))
+        });
+        let [deploy, retract] = gap_ref;
         let range = rig.control.adaptation_range;
-        // As far as the model goes.
-        let scale = |to| Ok(Scale::new(checked("control.adaptation_range", to)?).ratio());
-        // With which a tread as known is corrected by the gain.
-        let known = KNOWN_DEVIATION.to_num::<f64>();
-        let measured = known * known * (1.0 / rig.control.adaptation_gain.max(1e-3) - 1.0);
+        let scale = |to| checked("control.adaptation_range", to);
+        let answers = 1.0 + PROPORTIONAL;
         Ok(Self {
-            model,
-            guard: Guard::try_build(rig)?,
+            tread,
+            profile: Profile::try_build(rig)?,
             timing: Timing::try_build(rig)?,
-            dip: Dip::try_build(rig)?,
+            drive: DriveModel {
+                decay: checked("drive.no_load_speed_mm_s", 1e-3 * CROSSOVER_RAD_S / answers)?,
+                lag_per_load: checked(
+                    "drive.stall_force_n",
+                    rig.drive.no_load_speed_mm_s / rig.drive.stall_force_n / answers,
+                )?,
+            },
+            pretightener: PretightenerModel {
+                settles: checked("preload.delay_s", rig.preload.delay_s + rig.preload.lag_s)?,
+                rate: checked("preload.slew_n_per_s", rig.preload.slew_n_per_s)? * SLEW_PART,
+            },
+            guard: Guard::try_build(rig)?,
             strategy,
             tangents,
             coupling: checked("plant.arm_coupling", rig.plant.arm_coupling)?,
-            load: checked("plant.top_load_n", load)?,
-            gap_ref: [gap(references[0])?, gap(references[1])?],
-            reserve: checked("control.gap_reserve", reserve)?,
-            by_reserve: checked(
-                "control.gap_reserve",
-                if reserve > LEAST_RESERVE { 1.0 / reserve } else { 0.0 },
-            )?,
+            load: load_n,
+            gap_ref: [deploy?, retract?],
+            reserve: checked("control.gap_reserve", rig.control.gap_reserve)?,
             cruise_speed: checked("drive.cruise_speed_mm_s", rig.drive.cruise_speed_mm_s)?,
             least_speed: checked("drive.min_crossing_speed_mm_s", rig.least_planned_speed_mm_s())?,
             safe_speed: checked("control.safe_speed_mm_s", rig.control.safe_speed_mm_s)?,
@@ -80,6 +84,7 @@ impl Planner {
             prescribed_speed: None,
             uniform: false,
             radius: checked("rig.wheel_radius_mm", rig.rig.wheel_radius_mm)?,
+            touch_at: checked("rig.step_height_mm", touch(rig.rig.wheel_radius_mm, rig))?,
             felt_at: felt_at(rig)?,
             tolerance: checked("rig.step_tolerance_mm", rig.rig.step_tolerance_mm)?,
             cruise_preload: checked("preload.cruise_n", rig.preload.cruise_n)?,
@@ -88,7 +93,6 @@ impl Planner {
             friction: checked("plant.mu", rig.plant.mu)?,
             usable: checked("control.slip_margin", rig.plant.mu - rig.control.slip_margin)?,
             scale_range: (scale(1.0 - range)?, scale(1.0 + STIFFER_RANGE * range)?),
-            measured_variance: checked("control.adaptation_gain", measured)?,
         })
     }
 
@@ -101,6 +105,30 @@ impl Planner {
     }
 }
 
+/// Gap of a crossing at a constant speed under a constant radial force, mm.
+fn steady_gap(
+    tread: &Tread,
+    direction: Direction,
+    load: Newtons,
+    speed: MillimetresPerSecond,
+    force: Newtons,
+) -> Millimetres {
+    let reach = tread.radius() * STEADY_REACH;
+    let (from, until) = match direction {
+        Direction::Deploy => (-reach, Q16::ZERO),
+        Direction::Retract => (reach.half(), -reach),
+    };
+    let run =
+        Run { direction, axial: Axial::Driven(load), scale: Q16::ONE, level: false, from, until };
+    roll(tread, &mut TreadState::default(), &run, |_| (speed, force)).lift.gap
+}
+
+/// Distance to the face at which a wheel of this height touches the corner, mm.
+fn touch(height: f64, rig: &Rig) -> f64 {
+    let above = height - rig.rig.step_height_mm;
+    libm::sqrt(height * height - above * above)
+}
+
 /// Distances to the face at which the corner shows where it is, mm, as the crossing watch has
 /// it: on deploy with the first touch, where the centre has risen by 0.16 mm beside the tread's
 /// compression, `sqrt((y - rise)^2 - (y - h)^2)` at a height y; back once it has dipped by 1 mm.
@@ -111,122 +139,4 @@ fn felt_at(rig: &Rig) -> Result<[Millimetres; 2], RigError> {
     let dip = libm::sqrt(r * r - (r - DIP_MM) * (r - DIP_MM));
     let key = "rig.step_height_mm";
     Ok([checked(key, touch)?, checked(key, -dip)?])
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::model::plan::{Learned, PlanRequest, Review, Strategy};
-    use crate::units::Q16;
-    use proptest::prelude::*;
-
-    const ALL: [Strategy; 4] =
-        [Strategy::Scheduled, Strategy::Constant, Strategy::Limit, Strategy::Reactive];
-
-    fn request(back: bool, step: u8, scale: f64) -> PlanRequest {
-        PlanRequest {
-            sequence: 1,
-            direction: if back { Direction::Retract } else { Direction::Deploy },
-            step,
-            learned: Learned { scale: Q16::from_num(scale), ..Learned::default() },
-            preload: Q16::from_num(50),
-            distance: Q16::ZERO,
-            review: None,
-            slipped: None,
-        }
-    }
-
-    proptest! {
-        #[test]
-        fn no_plan_leaves_the_limits(
-            strategy in 0..4usize,
-            back in any::<bool>(),
-            step in 0..4u8,
-            scale in 0.75..1.25f64,
-        ) {
-            let rig = Rig::prototype();
-            let planner = Planner::try_build_as(&rig, ALL[strategy]).unwrap();
-            let plan = planner.plan(&request(back, step, scale));
-            let (least, most) = (rig.drive.min_crossing_speed_mm_s, rig.drive.cruise_speed_mm_s);
-            let speed = plan.cross_speed.to_num::<f64>();
-            prop_assert!((least..=most).contains(&speed), "{speed}");
-            for preload in [plan.cross_preload, plan.cruise_preload] {
-                let preload = preload.to_num::<f64>();
-                prop_assert!(preload >= rig.preload.cruise_n - 1e-3);
-                prop_assert!(preload <= rig.most_preload_n() + 1e-3);
-            }
-            prop_assert!(plan.brake_distance >= Q16::ZERO && plan.brake_time >= Q16::ZERO);
-        }
-
-        #[test]
-        fn a_scheduled_preload_holds_the_target_gap_by_the_formulas(
-            back in any::<bool>(),
-            step in 1..4u8,
-            scale in 0.85..1.15f64,
-        ) {
-            let rig = Rig::prototype();
-            let planner = Planner::try_build(&rig).unwrap();
-            let request = request(back, step, scale);
-            let plan = planner.plan(&request);
-            let mut formula = Formula::new(&rig);
-            formula.k_inf *= scale;
-            let load = rig.plant.top_load_n * rig.plant.top_load_share;
-            let sine = (rig.centre_radius_mm(usize::from(step) - 1)
-                - rig.rig.arm_pivot_radius_mm)
-                / rig.rig.arm_length_mm;
-            let force = plan.cross_preload.to_num::<f64>()
-                + load * rig.plant.arm_coupling * sine / (1.0 - sine * sine).sqrt();
-            let speed = plan.cross_speed.to_num::<f64>();
-            let gap = formula.gap_mm(request.direction, speed, force, Some(load));
-            let target = planner.gap_ref(request.direction).to_num::<f64>()
-                * (1.0 - rig.control.gap_reserve);
-            // At the least speed the limit may not suffice; else the target is met, or
-            // undercut where the cruise preload alone does.
-            let floor = speed < rig.least_planned_speed_mm_s() + 0.01;
-            prop_assert!(floor || gap < target * 1.002, "{gap} {target}");
-        }
-
-        #[test]
-        fn adaptation_stays_in_its_range_whatever_is_measured(
-            gap in -5.0..10.0f64,
-            preload in 0.0..80.0f64,
-            speed in 0.0..60.0f64,
-            scale in 0.75..1.25f64,
-        ) {
-            let rig = Rig::prototype();
-            let planner = Planner::try_build(&rig).unwrap();
-            let q = Q16::from_num::<f64>;
-            let review = Review {
-                direction: Direction::Deploy,
-                speed: q(speed),
-                preload: q(preload),
-                tan_arm: q(1.0),
-                gap: q(gap),
-                seen: q(gap),
-                trusted: true,
-                slipped: false,
-            };
-            let plan = planner.plan(&PlanRequest { review: Some(review), ..request(false, 1, scale) });
-            let after = plan.outcome.unwrap().learned.scale.to_num::<f64>();
-            let range = rig.control.adaptation_range;
-            let (softest, stiffest) = (1.0 - range, 1.0 + STIFFER_RANGE * range);
-            prop_assert!(after >= softest - 1e-3 && after <= stiffest + 1e-3, "{after}");
-        }
-    }
-
-    #[test]
-    fn between_the_steps_only_the_limit_strategy_keeps_the_limit() {
-        let rig = Rig::prototype();
-        for strategy in ALL {
-            let planner = Planner::try_build_as(&rig, strategy).unwrap();
-            for step in 0..4 {
-                let preload = planner.plan(&request(false, step, 1.0)).cruise_preload;
-                let expected = match strategy {
-                    Strategy::Limit => rig.most_preload_n(),
-                    _ => rig.preload.cruise_n,
-                };
-                assert!((preload.to_num::<f64>() - expected).abs() < 1e-3, "{strategy:?}");
-            }
-        }
-    }
 }

@@ -58,7 +58,10 @@ impl TreadState {
 
     /// A wheel off the wall.
     pub(super) fn clear(&mut self) {
-        *self = Self::default();
+        // In place: two kilobytes are never on the stack.
+        self.frame = Frame::default();
+        self.patches = [Patch::default(); 2];
+        self.elements.fill(Element::default());
     }
 
     /// The element at a place.

@@ -10,7 +10,7 @@ use hil_sim::cli::failure::{Failure, Outcome};
 use hil_sim::cli::output;
 use hil_sim::progress;
 
-/// Measures run time against error: the reduced model in fixed point, f32 and f64, the
+/// Measures run time against error: the rolled-out tread in fixed point, the
 /// plant's resolution, other solvers on the same crossing.
 ///
 /// Times are processor time of one thread.

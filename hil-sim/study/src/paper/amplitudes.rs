@@ -59,7 +59,7 @@ impl Amplitudes {
         let of = |experiment: &&Experiment| {
             let case = &experiment.case;
             Ok(Three {
-                theory: theory::lift(case, Drive::Pushed, 0),
+                theory: theory::lift(case, Drive::Pushed, 0)?,
                 simulation: simulation::lift(case, Drive::Pushed, 0)?,
                 experiment: experiment.runs.iter().filter_map(|run| first(case, run)).collect(),
             })
@@ -279,7 +279,7 @@ impl Amplitudes {
                     "Clearance at the first step from lift-off on: up to {:.1} % apart.",
                     100.0 * resemblance
                 ),
-                "The reduced model knows one stiffness, that of the instant of lift-off, for which it is \
+                "That elastic ring has one stiffness, that of the instant of lift-off, for which it is \
                  made; later in the climb the tread relaxes and sinks in deeper than that.",
             ),
             Claim::of("fig15-16", "Vibration transmission model", "area-hardly-changes").judged(

@@ -33,7 +33,7 @@ pub struct Peak {
 #[derive(Clone, Debug)]
 pub struct Histories {
     pub case: Case,
-    /// The reduced model.
+    /// The controller's model.
     theory: History,
     /// The ring.
     simulation: History,

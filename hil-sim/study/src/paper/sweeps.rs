@@ -12,7 +12,7 @@ use super::published::{AREA_SPREAD_MM2, DEPTH_SPREAD_MM, GAP_SPREAD_MM};
 use super::simulation;
 use super::theory::{self, Drive, Lift};
 use crate::figure::{Figure, Mark, Panel, Series, Source};
-use hil_sim::plant::balance::BalanceError;
+use anyhow::Result;
 
 pub use claims::{preload_claims, speed_claims};
 
@@ -82,7 +82,7 @@ impl Variable {
 pub struct Curves {
     /// Where theory and simulation are given.
     pub at: Vec<f64>,
-    /// The reduced model.
+    /// The controller's model.
     pub theory: Vec<f64>,
     /// The ring.
     pub simulation: Vec<f64>,
@@ -108,7 +108,7 @@ pub struct Sweep {
 
 impl Sweep {
     /// Theory, simulation, and what the experiments on [`Variable::cases`] gave.
-    pub fn new(variable: Variable, experiments: &[&Experiment]) -> Result<Self, BalanceError> {
+    pub fn new(variable: Variable, experiments: &[&Experiment]) -> Result<Self> {
         let cases = variable.cases();
         let (from, to) = (variable.of(&cases[0]), variable.of(&cases[cases.len() - 1]));
         let at: Vec<f64> =
@@ -120,9 +120,9 @@ impl Sweep {
                 // The middle stage represents the mean of the three: the arm's thrust is
                 // nearly linear over them.
                 let simulated = simulation::lift(&case, Drive::Driven, 1)?;
-                Ok((theory::mean_lift(&case, Drive::Driven), simulated))
+                Ok((theory::mean_lift(&case, Drive::Driven)?, simulated))
             })
-            .collect::<Result<_, BalanceError>>()?;
+            .collect::<Result<_>>()?;
         let means = |reading: fn(&Reading) -> f64| {
             Means::of(experiments, |e| variable.of(&e.case), reading, GRID)
         };
@@ -191,7 +191,7 @@ impl Sweep {
         let caption = if id == "fig20" {
             format!(
                 "At rig loads, {fixed}. The wheel drives itself against a third of the 20 N on top, \
-                 and the arm presses it into the wall. Theory: reduced model, closed form. \
+                 and the arm presses it into the wall. Theory: the tread rolled out in fixed point. \
                  Simulation: the converged ring with memory. Experiment: forty rigs within their \
                  tolerances, values as the sensors give them, mean of the three transitions of a \
                  deployment, a parabola for each rig, four means of ten. The two marks are apart \

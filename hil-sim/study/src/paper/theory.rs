@@ -1,16 +1,17 @@
-//! What the reduced model says: gap, embedding depth, contact area and collision force
-//! of a crossing in closed form, and its history as that of an elastic ring of the
-//! effective stiffness.
+//! What the controller's model says, the tread rolled out in fixed point: gap, embedding depth,
+//! contact area and collision force of a crossing, and its history as that of an elastic ring of
+//! the effective stiffness.
 
-use interstage::model::formula::Formula;
+use anyhow::{Context, Result};
 use interstage::units::Direction;
 
 use super::case::{Arms, Case};
 use super::history::{History, INTERVAL_S, Instant};
 use super::measure::{corner_area_mm2, stress_kpa};
-use hil_sim::plant::balance::{Axial, Balance, BalanceError};
+use hil_sim::plant::balance::{Axial, Balance};
 use hil_sim::plant::ring::{Motion, Ring, RingParameters};
 use hil_sim::plant::wall::{Step, Wall};
+use hil_sim::rollout::{CrossingSetup, Wheel, halved};
 
 /// Whether the wheel is pushed without friction, as in the study's theory, or drives
 /// itself against its load, as on a rig.
@@ -36,66 +37,79 @@ pub struct Lift {
     pub impact_kpa: f64,
 }
 
-/// The reduced model's crossing from sleeve `level`.
-pub fn lift(case: &Case, drive: Drive, level: usize) -> Lift {
-    let formula = Formula::new(&case.loads.rig());
-    let (force, load) = match drive {
+/// How the wheel crosses from sleeve `level`.
+pub fn setup(case: &Case, drive: Drive, level: usize) -> CrossingSetup {
+    let (preload_n, load_n) = match drive {
         Drive::Pushed => (case.preload_n, None),
         Drive::Driven => (case.pressing_n(level), Some(case.load_n())),
     };
-    let crossing = formula.crossing(Direction::Deploy, case.speed_mm_s, force, load);
-    let gap = crossing.gap_mm;
-    let area = area_of_gap_mm2(&formula, gap);
-    let collision = crossing.corner_force_n;
-    Lift {
-        gap_mm: gap,
-        depth_mm: formula.depth_mm(gap),
+    CrossingSetup { speed_mm_s: case.speed_mm_s, preload_n, direction: Direction::Deploy, load_n }
+}
+
+/// The model's crossing from sleeve `level`; the collision is the largest of the crossing.
+pub fn lift(case: &Case, drive: Drive, level: usize) -> Result<Lift> {
+    let rig = case.loads.rig();
+    let crossed = Wheel::try_build(&rig)?.cross(&setup(case, drive, level));
+    let crossed = crossed.context("a wheel that sinks in has no gap")?;
+    let size = (rig.rig.wheel_radius_mm, rig.rig.wheel_width_mm);
+    let area = corner_area_mm2(size, crossed.ahead_mm, crossed.above_mm);
+    Ok(Lift {
+        gap_mm: crossed.gap_mm,
+        depth_mm: crossed.depth_mm,
         area_mm2: area,
-        collision_n: collision,
-        impact_kpa: stress_kpa(collision, area),
-    }
+        collision_n: crossed.corner_force_n,
+        impact_kpa: stress_kpa(crossed.corner_force_n, area),
+    })
 }
 
 /// The same, mean over the three stages.
-pub fn mean_lift(case: &Case, drive: Drive) -> Lift {
-    let all: Vec<Lift> = (0..3).map(|level| lift(case, drive, level)).collect();
+pub fn mean_lift(case: &Case, drive: Drive) -> Result<Lift> {
+    let all: Vec<Lift> = (0..3).map(|level| lift(case, drive, level)).collect::<Result<_>>()?;
     let mean = |figure: fn(&Lift) -> f64| all.iter().map(figure).sum::<f64>() / 3.0;
-    Lift {
+    Ok(Lift {
         gap_mm: mean(|l| l.gap_mm),
         depth_mm: mean(|l| l.depth_mm),
         area_mm2: mean(|l| l.area_mm2),
         collision_n: mean(|l| l.collision_n),
         impact_kpa: mean(|l| l.impact_kpa),
-    }
-}
-
-/// Contact area at lift-off with this gap, mm^2.
-fn area_of_gap_mm2(formula: &Formula, gap_mm: f64) -> f64 {
-    let above = formula.radius_mm - formula.step_mm;
-    corner_area_mm2((formula.radius_mm, formula.width_mm), formula.distance_mm(gap_mm), above)
+    })
 }
 
 /// Contact area that belongs to a tread depth at lift-off, mm^2, by the nominal
 /// geometry: how a compression sensor's reading becomes an area.
 pub fn area_of_depth_mm2(case: &Case, depth_mm: f64) -> f64 {
-    let formula = Formula::new(&case.loads.rig());
-    let above = formula.radius_mm - formula.step_mm;
-    let reach = formula.radius_mm - depth_mm;
+    let wheel = case.loads.rig().rig;
+    let above = wheel.wheel_radius_mm - wheel.step_height_mm;
+    let reach = wheel.wheel_radius_mm - depth_mm;
     let ahead = (reach * reach - above * above).max(0.0).sqrt();
-    corner_area_mm2((formula.radius_mm, formula.width_mm), ahead, above)
+    corner_area_mm2((wheel.wheel_radius_mm, wheel.wheel_width_mm), ahead, above)
 }
 
 /// Elements of the elastic ring of a deployment and its axial travel per step, mm.
 const COARSE: (usize, f64) = (1440, 0.02);
 
-/// A deployment of the driven wheel as the reduced model has it: an elastic ring of the
-/// stiffness that is effective at lift-off, and an arm that bends as under a static force.
-pub fn deployment(case: &Case, arms: &Arms) -> Result<History, BalanceError> {
+/// Stiffness, over the relaxed one, of the elastic tread that lifts off with the gap of the
+/// driven wheel.
+fn effective_stiffness(case: &Case) -> Result<f64> {
+    let gap_mm = mean_lift(case, Drive::Driven)?.gap_mm;
+    let setup = setup(case, Drive::Driven, 1);
     let rig = case.loads.rig();
-    let formula = Formula::new(&rig);
-    let gap = mean_lift(case, Drive::Driven).gap_mm;
+    let softer = |stiffness: f64| {
+        let mut elastic = rig.clone();
+        elastic.tread.k_inf_pa_per_m *= stiffness;
+        elastic.tread.stiffening = 1.0;
+        let crossed = Wheel::try_build(&elastic).ok().and_then(|wheel| wheel.cross(&setup));
+        crossed.is_none_or(|crossed| crossed.gap_mm < gap_mm)
+    };
+    Ok(halved((1.0, rig.tread.stiffening), softer))
+}
+
+/// A deployment of the driven wheel as an elastic ring of the stiffness that is effective at
+/// lift-off, and an arm that bends as under a static force.
+pub fn deployment(case: &Case, arms: &Arms) -> Result<History> {
+    let rig = case.loads.rig();
     let mut tread = RingParameters::of(&rig, COARSE.0);
-    tread.k_inf *= formula.stiffness(Direction::Deploy, case.speed_mm_s, gap, Some(case.load_n()));
+    tread.k_inf *= effective_stiffness(case)?;
     tread.k_0 = tread.k_inf;
     let height_mm = rig.rig.step_height_mm;
     let steps = rig.rig.step_positions_mm.iter();
@@ -147,12 +161,13 @@ mod tests {
     use crate::paper::case::Loads;
 
     #[test]
-    fn depth_and_gap_give_the_same_area() {
-        for preload in [33.3, 50.0] {
-            let case = Case::new(Loads::Prototype, 5.0, preload);
-            let lift = lift(&case, Drive::Driven, 1);
-            let area = area_of_depth_mm2(&case, lift.depth_mm);
-            assert!((area / lift.area_mm2 - 1.0).abs() < 1e-9, "{area} {lift:?}");
+    fn a_depth_gives_the_area_that_the_corner_cuts_off() {
+        let case = Case::new(Loads::Prototype, 5.0, 33.3);
+        for ahead_mm in [0.5, 8.0, 12.5] {
+            let depth_mm = 25.0 - 21.0_f64.hypot(ahead_mm);
+            let exact = corner_area_mm2((25.0, 28.0), ahead_mm, 21.0);
+            let area = area_of_depth_mm2(&case, depth_mm);
+            assert!((area / exact - 1.0).abs() < 1e-9, "{area} {exact}");
         }
     }
 
@@ -160,7 +175,7 @@ mod tests {
     fn the_fitted_gaps_are_met_without_friction() {
         let gaps = [1.7427, 1.5682, 1.8994];
         for ((speed, preload), gap) in crate::paper::published::CASES.into_iter().zip(gaps) {
-            let lift = lift(&Case::new(Loads::Fe, speed, preload), Drive::Pushed, 0);
+            let lift = lift(&Case::new(Loads::Fe, speed, preload), Drive::Pushed, 0).unwrap();
             assert!((lift.gap_mm - gap).abs() < 0.01, "{lift:?}");
         }
     }

@@ -28,7 +28,7 @@ pub fn figure(all: &[Histories]) -> Figure {
                    third). (a) Collision: axial force of the contact against the motion, beyond \
                    rolling resistance. (b) Impact: that force over the part of the wheel that the \
                    step cuts off. (c) Vibration: deflection of the arm at the wheel by the part of the \
-                   collision that lies across it. Theory: an elastic ring of the reduced model's \
+                   collision that lies across it. Theory: an elastic ring of the model's \
                    effective stiffness, the arm as under a still force. Simulation: the reference \
                    models, a ring with memory and inertia, waves in the tread to the hub, six modes \
                    of the arm. Experiment: the virtual rig logged every 0.1 s, four means of ten; forces are the plant's own. The study prints no value of its curves."

@@ -70,6 +70,11 @@ impl Profile {
 }
 
 impl ProfileState {
+    /// At this speed, mm/s, without acceleration.
+    pub fn at(speed: MillimetresPerSecond) -> Self {
+        Self { speed: speed.widen(), acceleration: MillimetresPerSecond2::ZERO }
+    }
+
     /// Speed, mm/s.
     pub fn speed(&self) -> MillimetresPerSecond {
         Q16::narrow(self.speed)

@@ -1,0 +1,240 @@
+//! One crossing of a plan, rolled out: the wheel follows the plan's approach as the tick does, and
+//! the tread says what comes of it.
+
+#![deny(clippy::float_arithmetic)]
+
+use super::Planner;
+use crate::model::approach::{Approach, Begun, Place};
+use crate::model::profile::ProfileState;
+use crate::model::rollout::{LEAST_SPEED, LiftOff};
+use crate::model::tread::{Axial, Drive, TreadState};
+use crate::numeric::divide;
+use crate::units::{
+    Direction, Millimetres, MillimetresPerSecond, Newtons, Q16, Ratio, Seconds, per_tick, q16,
+    ticks_to_seconds,
+};
+
+/// Tread that rolls before the corner is touched, over the wheel radius: half of the longest patch.
+const ROLL_IN: Ratio = q16(250_000);
+/// Ticks of a stride at most: a wheel that stands.
+const MOST_TICKS: u32 = 400;
+/// Ticks before the tread is rolled, at most.
+const MOST_TICKS_BEFORE: u32 = 4000;
+/// Strides of a rollout at most.
+const MOST_STRIDES: u32 = 220;
+/// Travel at a steady speed that is taken at once, mm.
+const STEADY: Millimetres = q16(20_000);
+
+/// What stays the same while a crossing is planned.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Scene {
+    pub(super) direction: Direction,
+    /// Load and stiffness as known.
+    pub(super) load: Newtons,
+    pub(super) scale: Ratio,
+    /// Distance to the face at which the corner is felt, mm.
+    pub(super) felt_at: Millimetres,
+    /// Largest speed up to the step, mm/s.
+    pub(super) cruise: MillimetresPerSecond,
+    /// Radial force beside the preload, N.
+    pub(super) arm_thrust: Newtons,
+    /// Preload now, that to which it rises, N, and distance to the face, mm.
+    pub(super) preload: Newtons,
+    pub(super) most: Newtons,
+    pub(super) distance: Millimetres,
+    /// It rises from where the corner is felt.
+    pub(super) reacts: bool,
+    /// Time until a wheel at rest moves, s.
+    pub(super) starts: Option<Seconds>,
+}
+
+/// A crossing rolled out.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct RolledOut {
+    pub(super) gap: Millimetres,
+    /// Distance along the run to the face at lift-off (retract: touch-down), mm.
+    pub(super) lift: Millimetres,
+    /// Preload there, N.
+    pub(super) preload: Newtons,
+    /// It still rises.
+    pub(super) rising: bool,
+    /// Largest friction needed.
+    pub(super) utilisation: Ratio,
+    /// Speed at lift-off, mm/s.
+    pub(super) speed: MillimetresPerSecond,
+    /// Where the corner is looked for, mm, and from there to lift-off, s.
+    pub(super) from: Millimetres,
+    pub(super) takes: Seconds,
+    /// From where it speeds up again to lift-off, s.
+    pub(super) released: Seconds,
+    /// Time that is lost until the speed is that of cruise again, s.
+    pub(super) regains: Seconds,
+}
+
+/// An approach and what it gives.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Course {
+    pub(super) approach: Approach,
+    pub(super) rolled: RolledOut,
+}
+
+impl Planner {
+    /// Rolls the wheel over the step by this approach under this preload, N.
+    pub(super) fn roll_out(
+        &self,
+        state: &mut TreadState,
+        scene: &Scene,
+        approach: &Approach,
+    ) -> RolledOut {
+        let forward = scene.direction == Direction::Deploy;
+        let along = |position: Millimetres| if forward { -position } else { position };
+        let braking = self.timing.brake_distance(scene.cruise, approach.window_speed);
+        let looks = approach.window_from + braking;
+        let from = match scene.direction {
+            Direction::Deploy => self.touch_at + self.radius * ROLL_IN,
+            Direction::Retract => self.radius * ROLL_IN,
+        };
+        let mut drive = Drive {
+            direction: scene.direction,
+            axial: Axial::Driven(scene.load),
+            pressed: Q16::ZERO,
+            duration: Q16::ZERO,
+            scale: scene.scale,
+            level: false,
+        };
+        let start = match scene.starts {
+            Some(_) => scene.distance.max(from),
+            None => looks.max(from),
+        };
+        let before = scene.starts.unwrap_or_default()
+            + divide((scene.distance - start).max(Q16::ZERO), scene.cruise);
+        let mut reacts_at = None;
+        let mut preload = |ticks: u32, felt: bool| {
+            let mut since = before + ticks_to_seconds(ticks);
+            if scene.reacts {
+                let at = felt.then(|| *reacts_at.get_or_insert(since));
+                since = at.map_or(Q16::ZERO, |at| since - at);
+            }
+            let rising = (since - self.pretightener.settles).max(Q16::ZERO);
+            (scene.preload + rising * self.pretightener.rate).min(scene.most.max(scene.preload))
+        };
+        // What lies before the tread's first stride is driven without it.
+        let mut follower =
+            Follower::new(if scene.starts.is_some() { Q16::ZERO } else { scene.cruise });
+        let mut distance = start;
+        let mut ticks_in_all = 0;
+        while distance > from && ticks_in_all < MOST_TICKS_BEFORE {
+            let ticks = follower.step(self, approach, scene, distance);
+            distance -= Q16::narrow(per_tick(follower.speed())) * Q16::from_num(ticks);
+            ticks_in_all += ticks;
+        }
+        drive.pressed = preload(ticks_in_all, false) + scene.arm_thrust;
+        self.tread.put_down(state, along(from), &drive);
+        let mut rolled = RolledOut { from: start, ..RolledOut::default() };
+        let mut lift = LiftOff::default();
+        let (mut per_tread, mut left) = (Q16::ONE, Q16::ZERO);
+        let mut carried = Q16::ZERO;
+        let mut overshot = Q16::ZERO;
+        let (mut here, mut speed) = (from, Q16::ZERO);
+        for _ in 0..MOST_STRIDES {
+            left += self.tread.stride();
+            let mut ticks = 0;
+            while left > Q16::ZERO && ticks < MOST_TICKS {
+                let passed = follower.step(self, approach, scene, distance);
+                let travel = Q16::narrow(per_tick(follower.speed())) * Q16::from_num(passed);
+                left -= travel;
+                distance -= travel * per_tread;
+                ticks += passed;
+            }
+            let ticks = ticks.max(1);
+            ticks_in_all += ticks;
+            // The last tick goes on into the next stride.
+            let over = divide(-left, follower.speed());
+            drive.duration = ticks_to_seconds(ticks) - over + overshot;
+            overshot = over;
+            drive.pressed = preload(ticks_in_all, follower.felt) + scene.arm_thrust;
+            let contact = self.tread.advance(state, &drive);
+            let now = along(contact.position);
+            per_tread = divide(here - now, self.tread.stride());
+            here = now;
+            // The stride's remainder lies ahead.
+            distance = now - left;
+            if follower.begun.released {
+                rolled.released += drive.duration;
+            }
+            // A corner that is felt is fed forward.
+            if !follower.felt {
+                follower.lags += (contact.axial - carried) * self.drive.lag_per_load;
+            }
+            carried = contact.axial;
+            lift.follow(&self.tread, scene.direction, &contact);
+            speed = divide(self.tread.stride() * per_tread, drive.duration);
+            if lift.is_found() {
+                break;
+            }
+        }
+        rolled.gap = lift.gap;
+        rolled.utilisation = lift.utilisation;
+        rolled.lift = along(lift.position);
+        rolled.speed = speed;
+        rolled.preload = preload(ticks_in_all, follower.felt);
+        rolled.rising = rolled.preload < scene.most;
+        rolled.takes = ticks_to_seconds(ticks_in_all);
+        // A wheel that still brakes first has to end that.
+        let slows = (-follower.profile.acceleration()).max(Q16::ZERO);
+        let until_level = self.timing.until_level(slows);
+        let now = follower.profile.speed();
+        let level = (now - slows * until_level.half()).max(Q16::ZERO);
+        let share = divide(scene.cruise - (now + level).half(), scene.cruise);
+        rolled.regains = until_level * share + self.lost(level, scene.cruise);
+        rolled
+    }
+}
+
+/// The speed that the tick asks for on its way over a corner, and that the wheel has.
+struct Follower {
+    profile: ProfileState,
+    begun: Begun,
+    felt: bool,
+    /// By how much the wheel is slower than the profile, mm/s.
+    lags: MillimetresPerSecond,
+}
+
+impl Follower {
+    fn new(speed: MillimetresPerSecond) -> Self {
+        Self {
+            profile: ProfileState::at(speed),
+            begun: Begun::default(),
+            felt: false,
+            lags: Q16::ZERO,
+        }
+    }
+
+    fn speed(&self) -> MillimetresPerSecond {
+        (self.profile.speed() - self.lags).max(LEAST_SPEED)
+    }
+
+    /// Goes on for a tick, or for as many as a steady speed needs for [`STEADY`]; returns how many.
+    fn step(
+        &mut self,
+        planner: &Planner,
+        approach: &Approach,
+        scene: &Scene,
+        distance: Millimetres,
+    ) -> u32 {
+        self.felt |= distance <= scene.felt_at;
+        let (speed, acceleration) = (self.profile.speed(), self.profile.acceleration());
+        // The preload is that of the rollout: it is waited for where it is another.
+        let at = Place { distance, felt: self.felt, speed, acceleration, ready: true };
+        let target = approach.speed(&mut self.begun, &at, &planner.timing, scene.cruise);
+        let ticks = if speed == target && acceleration == Q16::ZERO {
+            divide(STEADY, Q16::narrow(per_tick(self.speed()))).to_num::<u32>().max(1)
+        } else {
+            planner.profile.step(&mut self.profile, target);
+            1
+        };
+        let decay = planner.drive.decay * Q16::from_num(ticks);
+        self.lags -= self.lags * decay.min(Q16::ONE);
+        ticks
+    }
+}

@@ -1,0 +1,298 @@
+//! The fastest course over a step that keeps the gap and the friction margin.
+//!
+//! A course is slow in the window in which the corner is looked for, brakes where it is felt, and
+//! speeds up again shortly before lift-off. Three numbers make it: the speed in the window, the
+//! slowest speed and the place of the release. For each window and release the slowest speed follows
+//! from the gap; of those pairs the one is taken whose course takes least time.
+
+#![deny(clippy::float_arithmetic)]
+
+use super::Planner;
+use super::course::{Course, RolledOut, Scene};
+use crate::model::approach::Approach;
+use crate::model::plan::PlanRequest;
+use crate::model::tread::TreadState;
+use crate::numeric::{between, divide};
+use crate::units::{Direction, Millimetres, MillimetresPerSecond, Q16, Ratio, Seconds, q16};
+
+/// The gap is met if it is below its target by no more than this part.
+const WITHIN: Ratio = q16(2_000);
+/// Rollouts that bring it there.
+const SOLVES: u32 = 6;
+/// Windows that are compared, by golden section, and releases before the last possible one, mm.
+const WINDOWS: u32 = 5;
+const RELEASES: [Millimetres; 3] = [q16(50_000), q16(-200_000), q16(300_000)];
+/// Golden section.
+const GOLDEN: Ratio = q16(618_034);
+/// A gap this near its target serves to compare, as a part.
+const NEAR: Ratio = q16(5_000);
+/// Change of the slowest speed with the gap that is tried first, 1/s.
+const FIRST_SLOPE: Q16 = q16(30_000_000);
+/// What a course counts that opens too wide a gap at its slowest, s, and for each part of that.
+const INFEASIBLE: Seconds = q16(1_000_000_000);
+/// Windows that are tried for a tread that no compared one suits.
+const SLOWER: u32 = 5;
+/// Time that a gap beyond its target counts as, s for each part of it.
+const PENALTY: Seconds = q16(100_000_000);
+
+/// A search for a course; it pauses after each rollout.
+pub(super) struct Search<'a, P> {
+    pause: &'a mut P,
+    planner: &'a Planner,
+    state: &'a mut TreadState,
+    scene: Scene,
+    target: Millimetres,
+    /// Lift-off with this gap, mm.
+    lift: Millimetres,
+    floor: MillimetresPerSecond,
+    ceiling: MillimetresPerSecond,
+    friction: Ratio,
+    usable: Ratio,
+    /// The wheel speeds up again before it lifts off.
+    releases: bool,
+    /// The slowest speed that met the gap last.
+    guess: MillimetresPerSecond,
+    /// Time that a wider gap saves, s/mm.
+    per_gap: Q16,
+}
+
+impl<'a, P: AsyncFnMut()> Search<'a, P> {
+    pub(super) fn new(
+        planner: &'a Planner,
+        (state, pause): (&'a mut TreadState, &'a mut P),
+        scene: Scene,
+        request: &PlanRequest,
+        (floor, ceiling): (MillimetresPerSecond, MillimetresPerSecond),
+    ) -> Self {
+        let target = planner.target(request.direction);
+        let (friction, usable) = planner.friction_of(&request.learned);
+        Self {
+            pause,
+            planner,
+            state,
+            scene,
+            target,
+            lift: planner.lift(request.direction, target),
+            floor,
+            ceiling,
+            friction,
+            usable,
+            releases: request.direction == Direction::Deploy
+                && !request.learned.unknown
+                && planner.prescribed_speed.is_none(),
+            guess: ceiling,
+            per_gap: q16(-1_500_000),
+        }
+    }
+
+    /// The fastest course.
+    pub(super) async fn fastest(&mut self) -> Course {
+        let planner = self.planner;
+        let fastest = planner.cruise_speed.min(planner.climb_speed);
+        // As fast as it goes.
+        let at_once = self.roll(fastest, Q16::ZERO, self.ceiling).await;
+        if self.fits(&at_once.rolled) && self.price(&at_once.rolled) == Q16::ZERO {
+            return at_once;
+        }
+        self.guess = self.floor.max(self.ceiling * q16(300_000));
+        // Where the preload is still missing it pays to stay slow for longer.
+        let releases: &[Millimetres] = match (self.releases, at_once.rolled.rising) {
+            (false, _) => &[Q16::ZERO],
+            (true, false) => &RELEASES[..1],
+            (true, true) => &RELEASES,
+        };
+        let (mut window, mut best, mut least) = (self.floor, Q16::ZERO, Q16::MAX);
+        for &release in releases {
+            let (at, cost) = self.window(fastest, release).await;
+            if cost < least {
+                (window, best, least) = (at, release, cost);
+            }
+        }
+        // Of a tread that opens too wide a gap with each of these: slower, and slow for longer.
+        for _ in 0..SLOWER {
+            if least < INFEASIBLE || window <= self.floor {
+                break;
+            }
+            window = (window * q16(600_000)).max(self.floor);
+            best = if self.releases { RELEASES[1] } else { Q16::ZERO };
+            least = self.cost_on_target(window, best).await;
+        }
+        let course = self.solve(window, best).await;
+        self.gripping(window, best, course).await
+    }
+
+    /// The window with which this release costs least, s: golden section.
+    async fn window(
+        &mut self,
+        fastest: MillimetresPerSecond,
+        release: Millimetres,
+    ) -> (MillimetresPerSecond, Seconds) {
+        let (mut low, mut high) = (self.floor, fastest);
+        let mut inner = [high - (high - low) * GOLDEN, low + (high - low) * GOLDEN];
+        let mut costs = [
+            self.cost_on_target(inner[0], release).await,
+            self.cost_on_target(inner[1], release).await,
+        ];
+        for _ in 2..WINDOWS {
+            let [slower, faster] = costs;
+            if slower < faster {
+                high = inner[1];
+                inner = [high - (high - low) * GOLDEN, inner[0]];
+                costs = [self.cost_on_target(inner[0], release).await, slower];
+            } else {
+                low = inner[0];
+                inner = [inner[1], low + (high - low) * GOLDEN];
+                costs = [faster, self.cost_on_target(inner[1], release).await];
+            }
+        }
+        if costs[0] < costs[1] { (inner[0], costs[0]) } else { (inner[1], costs[1]) }
+    }
+
+    /// Time of the course with this window and release whose gap is the target, s, by
+    /// interpolation between the last two that come near it.
+    async fn cost_on_target(
+        &mut self,
+        window: MillimetresPerSecond,
+        release: Millimetres,
+    ) -> Seconds {
+        let [course, before] = self.approach_target(window, release, NEAR).await;
+        let (gap, cost) = (course.rolled.gap, self.cost(&course.rolled));
+        let slowest = course.approach.slowest_speed;
+        if slowest > self.floor {
+            self.guess = slowest;
+        } else if gap > self.target {
+            return cost + INFEASIBLE + divide(gap - self.target, self.target) * PENALTY;
+        }
+        let apart = before.rolled.gap - gap;
+        if before.rolled.gap > Q16::ZERO && apart.abs() > self.target * WITHIN {
+            self.per_gap = divide(self.cost(&before.rolled) - cost, apart).min(Q16::ZERO);
+        }
+        cost + (self.target - gap) * self.per_gap
+    }
+
+    /// The course with this window and release whose gap is the target or a little less.
+    async fn solve(&mut self, window: MillimetresPerSecond, release: Millimetres) -> Course {
+        let [course, before] = self.approach_target(window, release, Q16::ZERO).await;
+        if self.fits(&course.rolled) || !self.fits(&before.rolled) { course } else { before }
+    }
+
+    /// The last two courses on the way to the target: regula falsi. Ends where the gap is less than
+    /// the target by at most [`WITHIN`], or more by at most `over`, both as parts.
+    async fn approach_target(
+        &mut self,
+        window: MillimetresPerSecond,
+        release: Millimetres,
+        over: Ratio,
+    ) -> [Course; 2] {
+        let most = window.min(self.ceiling);
+        let (mut low, mut high) = (self.floor, most);
+        let (mut under, mut above): (Option<Course>, Option<Course>) = (None, None);
+        let mut speed = between(self.guess, low, high);
+        let aim = self.target + self.target * (over - WITHIN).half();
+        let mut last = [Course::default(); 2];
+        for _ in 0..SOLVES {
+            let course = self.roll(window, release, speed).await;
+            last = [course, last[0]];
+            let gap = course.rolled.gap;
+            let (least, greatest) =
+                (self.target - self.target * (over + WITHIN), self.target + self.target * over);
+            if self.fits(&course.rolled) {
+                (low, under) = (speed, Some(course));
+            } else {
+                (high, above) = (speed, Some(course));
+            }
+            if least <= gap && gap <= greatest || high <= self.floor || low >= most {
+                return last;
+            }
+            let next = if last[1].rolled.gap > Q16::ZERO && last[1].rolled.gap != gap {
+                let before = last[1].approach.slowest_speed;
+                speed + (aim - gap) * divide(speed - before, gap - last[1].rolled.gap)
+            } else {
+                speed + (aim - gap) * FIRST_SLOPE
+            };
+            let edge = (high - low) * q16(150_000);
+            // To an end of the range if nothing between is known.
+            let low_end = if under.is_some() { low + edge } else { low };
+            let high_end = if above.is_some() { high - edge } else { high };
+            speed = between(next, low_end, high_end);
+        }
+        match under {
+            Some(course) if !self.fits(&last[0].rolled) => [course, last[0]],
+            _ => last,
+        }
+    }
+
+    /// The course, or a slower one if the margin that it saves is worth its time.
+    async fn gripping(
+        &mut self,
+        window: MillimetresPerSecond,
+        release: Millimetres,
+        course: Course,
+    ) -> Course {
+        let mut best = course;
+        if self.price(&course.rolled) > Q16::ZERO {
+            let fastest = course.approach.slowest_speed;
+            for part in [q16(750_000), q16(500_000), q16(250_000), Q16::ZERO] {
+                let slower =
+                    self.roll(window, release, self.floor + (fastest - self.floor) * part).await;
+                if self.cost(&slower.rolled) < self.cost(&best.rolled) {
+                    best = slower;
+                }
+            }
+        }
+        best
+    }
+
+    async fn roll(
+        &mut self,
+        window: MillimetresPerSecond,
+        release: Millimetres,
+        slowest: MillimetresPerSecond,
+    ) -> Course {
+        let approach = self.shape(window.max(slowest), release, slowest);
+        let rolled = self.planner.roll_out(self.state, &self.scene, &approach);
+        (self.pause)().await;
+        Course { approach, rolled }
+    }
+
+    fn fits(&self, rolled: &RolledOut) -> bool {
+        rolled.gap <= self.target && rolled.gap > Q16::ZERO
+    }
+
+    fn cost(&self, rolled: &RolledOut) -> Seconds {
+        let before = (self.scene.distance - rolled.from).max(Q16::ZERO);
+        divide(before, self.scene.cruise) + rolled.takes + rolled.regains + self.price(rolled)
+    }
+
+    /// Time that the margin of friction is worth which this lacks, s.
+    fn price(&self, rolled: &RolledOut) -> Seconds {
+        self.planner.price(rolled.utilisation, self.friction, self.usable)
+    }
+
+    /// The approach with this speed in the window, this much of release before the last possible
+    /// one, and this slowest speed.
+    fn shape(
+        &self,
+        window_speed: MillimetresPerSecond,
+        release: Millimetres,
+        slowest_speed: MillimetresPerSecond,
+    ) -> Approach {
+        let planner = self.planner;
+        let (window, release_from) = if self.releases {
+            let (travel, _) = planner.timing.build_up(slowest_speed);
+            (planner.tolerance.half(), self.lift + travel + release)
+        } else {
+            (planner.tolerance, self.lift)
+        };
+        let felt_at = planner.felt_at[self.scene.direction as usize];
+        Approach {
+            window_from: felt_at + window,
+            window_speed,
+            brake_from: felt_at,
+            slowest_speed,
+            release_from,
+            lift: self.lift,
+            ..Approach::default()
+        }
+    }
+}
