@@ -91,7 +91,7 @@ impl Estimator {
         }
         self.feel(state, tick.sensed);
         self.hold_to_corner(state, tick.sensed);
-        if state.watch.contact == Contact::Wall && !state.known.is_searching() {
+        if state.watch.contact == Contact::Wall || state.known.is_searching() {
             let (travel, compression) = (tick.sensed.travel, tick.sensed.compression_filtered);
             let (speed, duty, pressed) = (tick.sensed.speed.value, tick.duty, tick.pressed);
             let rolls = Rolls { direction, travel, speed, duty, pressed, compression };
@@ -181,7 +181,13 @@ impl Estimator {
         let seen = self.watch_input(state, sensed);
         self.watch.rest(&mut state.watch, &seen);
         let (preload, compression) = (sensed.preload_filtered, sensed.compression_filtered);
-        if begin || state.on_corner() || state.known.is_searching() {
+        // Where the wheel is not known it is on a wall by its compression.
+        let on_edge = if state.known.is_searching() {
+            self.tread.may_rest_on_edge(preload, compression)
+        } else {
+            state.on_corner()
+        };
+        if begin || on_edge {
             self.tread.begin(&mut state.tread, sensed.travel, preload, compression);
             return false;
         }

@@ -45,6 +45,10 @@ const SOFT_AS: Ratio = q16(1_160_000);
 /// The same above which it is stiffer than known by as much; below, it may be the sensors.
 const STIFF: Ratio = q16(1_030_000);
 
+/// Load at rest of a tread as known over the load that its compression means, as a difference
+/// from 1: three deviations of its stiffness, of 4 %.
+const REST_WITHIN: Ratio = q16(120_000);
+
 /// Elements, and their distance over the wheel's radius: 20 mm of the published wheel's tread.
 const ELEMENTS: usize = 32;
 const SPACING: f64 = 1.0 / 40.0;
@@ -278,10 +282,16 @@ impl Tread {
     ) -> bool {
         let (meant, _) = self.load(state, Q16::ZERO, compression);
         state.ticks = state.ticks.saturating_add(1);
-        if state.ticks < FORGETS || preload < self.least {
+        if preload < self.least {
             return false;
         }
-        state.rest.add(preload, meant);
+        let forgot = state.ticks >= FORGETS;
+        if forgot || !state.rises {
+            state.rest.add(preload, meant);
+        }
+        if !forgot {
+            return false;
+        }
         let most = preload + arm_thrust;
         let off = meant > most + most * BAND || meant < preload - preload * BAND;
         state.off = if off { state.off.saturating_add(1) } else { 0 };
@@ -294,7 +304,14 @@ impl Tread {
     /// preload did not rise there.
     pub fn roll(&self, state: &mut TreadState, tick: &Rolls) -> Option<Shown> {
         if !state.rises {
-            return None;
+            // A wheel that stood under its preload before a first drop shows its tread at rest.
+            let rest = core::mem::take(&mut state.rest);
+            let seen = tick.direction == Direction::Retract && rest.ticks > OFF_TICKS;
+            let (rest, pressed) = (rest.ratio(), tick.pressed);
+            let other = (rest - Ratio::ONE).abs() > REST_WITHIN;
+            let load_sigma = self.load_sigma;
+            let shown = Shown { rest, rolled: rest, pressed, load: None, load_sigma };
+            return (seen && other).then_some(shown);
         }
         let rolled = match tick.direction {
             Direction::Deploy => Q16::narrow(tick.travel - state.from),

@@ -61,7 +61,14 @@ impl Controller {
             return Targets { preload, ..hold };
         };
         let course = self.course(state, tick, direction);
-        let mut targets = self.schedule.targets(self.estimator.steps(), plan, &course);
+        let mut plan = *plan;
+        let learned = &state.planning.learned;
+        if state.planning.asked > 0 && (learned.unknown || learned.extra_load > Q16::ZERO) {
+            // The plan that is on its way knows of it: until then the wheel does not look for the
+            // corner faster than any plan would.
+            plan.approach.window_speed = plan.approach.window_speed.min(self.least_speed);
+        }
+        let mut targets = self.schedule.targets(self.estimator.steps(), &plan, &course);
         let (step, cross_speed) = (plan.step, plan.cross_speed);
         let (cross_preload, ramp_preload) = (plan.cross_preload, plan.ramp_preload);
         let most_preload = plan.most_preload;

@@ -15,7 +15,7 @@ const WAIT_TICKS: u32 = 100;
 const SURE_SLIP: Millimetres = q16(1_000_000);
 /// Ticks from a request until its answer counts: longer than a plan takes on the board, and the same on
 /// any core, so that a run is the same.
-const PLAN_TICKS: u32 = 250;
+const PLAN_TICKS: u32 = 120;
 /// Ticks within which the model task must answer.
 const ANSWER_TICKS: u32 = 500;
 

@@ -167,7 +167,7 @@ impl Planner {
         let error = divide(MEASURED_WITHIN, sensitivity);
         // The first crossing shows a tread no stiffer than the known one: it was softer, and is
         // as known otherwise.
-        let first = known.grips == Q16::ZERO;
+        let first = known.grips == Q16::ZERO && review.direction == Direction::Deploy;
         learned.unknown &= !first || known.scale + known.scale * seen > Ratio::ONE;
         let unknown = learned.unknown;
         let error = if unknown { error.max(UNLIKE) } else { error };
