@@ -19,8 +19,9 @@ const KEPT: usize = 16;
 /// Distance by which reference and encoder may bend apart within two spans, counts. Three
 /// readings of a counter are off by less than 2 counts together; a third full count takes
 /// `1 / (6 ms)^2`, 530 mm/s^2 beyond the reference: twice the acceleration of the profile. The
-/// worst of the random rigs is 2.1.
+/// worst of the random rigs is 2.1. Of finer counts that acceleration itself is the bound.
 const BENT_COUNTS: f64 = 2.5;
+const BENT_ACCELERATIONS: f64 = 2.0;
 /// Distance off the reference within two spans, mm: the dips behind a step make 0.11, and two
 /// readings of a counter are off by a count.
 const OFF_MM: f64 = 0.11;
@@ -217,8 +218,10 @@ impl CrossCheck {
         let counts = |mm: f64| checked("sense.encoder_counts", mm);
         let late = SHORT_LATENCIES * rig.preload.slew_n_per_s * rig.preload_latency_s();
         let short = late.max(SHORT_PART * rig.preload.cruise_n);
+        let span_s = 1e-3 * SPAN as f64;
+        let bent = BENT_ACCELERATIONS * rig.drive.acceleration_mm_s2 * span_s * span_s;
         Ok(Self {
-            bent: counts(BENT_COUNTS * count_mm)?,
+            bent: counts(bent.max(BENT_COUNTS * count_mm))?,
             off: counts(off_reference_mm(rig))?,
             progress: counts(PROGRESS_COUNTS * count_mm)?,
             start_lag: counts(START_LAG_MM)?,
