@@ -127,7 +127,10 @@ impl Schedule {
                 speed = plan.approach.speed(&mut begun, &place, &self.timing, plan.cruise_speed);
             }
             // On the edge alone a wheel that goes back cannot wait: its tread sinks in.
-            let waits = course.felt || course.preload_late;
+            // A plan that counts on all of the preload also waits for it where the corner is looked
+            // for; one that crosses while it rises has its own speed there.
+            let counts = begun.looking && plan.cross_preload >= plan.most_preload;
+            let waits = course.felt || course.preload_late || counts;
             let sinks = course.critical && course.direction == Direction::Retract;
             if missing > self.reached_within && waits && !sinks {
                 let allowed = self.until_ready(plan, course, distance, needed);
