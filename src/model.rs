@@ -4,7 +4,7 @@ pub mod approach;
 pub mod corner_profile;
 pub mod guard;
 pub mod history;
-mod plan;
+pub mod plan;
 pub mod planner;
 pub mod profile;
 pub mod rollout;

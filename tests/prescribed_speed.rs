@@ -13,6 +13,7 @@ fn a_prescribed_speed_is_planned() {
         learned: Learned::default(),
         preload: Q16::from_num(50),
         distance: Q16::from_num(4),
+        speed: Q16::ZERO,
         review: None,
         slipped: None,
     };

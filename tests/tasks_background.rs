@@ -24,6 +24,7 @@ fn request(sequence: u32) -> PlanRequest {
         learned: Learned::default(),
         preload: Ratio::from_num(50),
         distance: Ratio::from_num(4),
+        speed: Q16::ZERO,
         review: None,
         slipped: None,
     }

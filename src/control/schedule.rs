@@ -247,6 +247,7 @@ mod tests {
             learned: Learned::default(),
             preload: Q16::from_num(50),
             distance: Q16::ZERO,
+            speed: Q16::ZERO,
             review: None,
             slipped: None,
         });

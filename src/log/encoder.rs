@@ -292,6 +292,7 @@ mod tests {
             learned,
             preload: most,
             distance: most,
+            speed: most,
             review: Some(review),
             slipped: Some(most),
         };

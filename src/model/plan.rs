@@ -9,6 +9,10 @@ use crate::units::{Direction, Millimetres, MillimetresPerSecond, Newtons, Ratio,
 /// and relaxation time 5 % off.
 pub(super) const KNOWN_DEVIATION: Ratio = q16(50_000);
 
+/// Ticks from a request until its answer counts: longer than a plan takes on the board, and the same
+/// on any core, so that a run is the same.
+pub const PLAN_TICKS: u32 = 120;
+
 /// How preload and speed are chosen. The product is [`Strategy::Scheduled`]; the others are for
 /// comparison.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -137,6 +141,8 @@ pub struct PlanRequest {
     pub preload: Newtons,
     /// Axial distance along the run to the face of the step, mm.
     pub distance: Millimetres,
+    /// Speed along the run, mm/s.
+    pub speed: MillimetresPerSecond,
     /// The crossing just closed.
     pub review: Option<Review>,
     /// Radial force under which the wheel slips on the corner, N.

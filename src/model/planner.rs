@@ -229,6 +229,7 @@ impl Planner {
             most: self.most(),
             reacts: self.strategy == Strategy::Reactive,
             distance: request.distance,
+            speed: request.speed,
             starts: (request.preload < self.rolling_preload).then(|| {
                 let missing = self.rolling_preload - request.preload;
                 self.pretightener.settles + divide(missing, self.pretightener.rate)

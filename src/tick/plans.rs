@@ -4,6 +4,7 @@ use super::{Controller, CrossingRecord, Event, State, TickContext};
 use crate::control::schedule::Targets;
 use crate::estimate::OpenCrossing;
 use crate::fault::{Fault, Limit};
+use crate::model::plan::PLAN_TICKS;
 use crate::model::{Outcome, Plan, PlanRequest};
 use crate::supervise::Mode;
 use crate::units::{Direction, Millimetres, Newtons, Seconds, Tick, q16, ticks_to_seconds};
@@ -13,9 +14,6 @@ use crate::units::{Direction, Millimetres, Newtons, Seconds, Tick, q16, ticks_to
 const WAIT_TICKS: u32 = 100;
 /// Slip on a corner that ends a run for want of friction, mm: twice what a measured one is off by.
 const SURE_SLIP: Millimetres = q16(1_000_000);
-/// Ticks from a request until its answer counts: longer than a plan takes on the board, and the same on
-/// any core, so that a run is the same.
-const PLAN_TICKS: u32 = 120;
 /// Ticks within which the model task must answer.
 const ANSWER_TICKS: u32 = 500;
 
@@ -36,6 +34,7 @@ impl Controller {
             learned: planning.learned,
             preload: tick.sensed.preload_filtered,
             distance: self.estimator.distance(estimate).unwrap_or_default(),
+            speed: state.profile.speed(),
             review: planning.review,
             slipped: planning.slipped,
         });

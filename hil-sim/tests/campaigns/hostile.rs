@@ -248,6 +248,7 @@ fn ask(planner: &Planner, seed: u64) {
             learned,
             preload: Q16::from_num(33),
             distance: Q16::from_num(4),
+            speed: Q16::ZERO,
             review: Some(review),
             slipped: Some(any()),
         };

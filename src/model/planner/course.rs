@@ -5,6 +5,7 @@
 
 use super::Planner;
 use crate::model::approach::{Approach, Begun, Place};
+use crate::model::plan::PLAN_TICKS;
 use crate::model::profile::ProfileState;
 use crate::model::rollout::{LEAST_SPEED, LiftOff};
 use crate::model::tread::{Axial, Drive, TreadState};
@@ -38,10 +39,11 @@ pub(super) struct Scene {
     pub(super) cruise: MillimetresPerSecond,
     /// Radial force beside the preload, N.
     pub(super) arm_thrust: Newtons,
-    /// Preload now, that to which it rises, N, and distance to the face, mm.
+    /// Preload now, that to which it rises, N, distance to the face, mm, and speed, mm/s.
     pub(super) preload: Newtons,
     pub(super) most: Newtons,
     pub(super) distance: Millimetres,
+    pub(super) speed: MillimetresPerSecond,
     /// It rises from where the corner is felt.
     pub(super) reacts: bool,
     /// Time until a wheel at rest moves, s.
@@ -102,12 +104,18 @@ impl Planner {
             scale: scene.scale,
             level: false,
         };
-        let start = match scene.starts {
-            Some(_) => scene.distance.max(from),
-            None => looks.max(from),
+        // A wheel that is close and not at cruise speed goes on from where it then is.
+        let goes_on = scene.distance - scene.speed * ticks_to_seconds(PLAN_TICKS);
+        let reach = looks + self.timing.brake_distance(scene.cruise, Q16::ZERO);
+        let (before, start, speed) = if let Some(starts) = scene.starts {
+            (starts, scene.distance.max(from), Q16::ZERO)
+        } else if scene.speed < scene.cruise && goes_on < reach {
+            (ticks_to_seconds(PLAN_TICKS), goes_on.max(from), scene.speed)
+        } else {
+            let start = looks.max(from);
+            let rolls = (scene.distance - start).max(Q16::ZERO);
+            (divide(rolls, scene.cruise), start, scene.cruise)
         };
-        let before = scene.starts.unwrap_or_default()
-            + divide((scene.distance - start).max(Q16::ZERO), scene.cruise);
         let mut reacts_at = None;
         let mut preload = |ticks: u32, felt: bool| {
             let mut since = before + ticks_to_seconds(ticks);
@@ -119,8 +127,7 @@ impl Planner {
             (scene.preload + rising * self.pretightener.rate).min(scene.most.max(scene.preload))
         };
         // What lies before the tread's first stride is driven without it.
-        let mut follower =
-            Follower::new(if scene.starts.is_some() { Q16::ZERO } else { scene.cruise });
+        let mut follower = Follower::new(speed);
         let mut distance = start;
         let mut ticks_in_all = 0;
         while distance > from && ticks_in_all < MOST_TICKS_BEFORE {

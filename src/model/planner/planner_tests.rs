@@ -21,6 +21,7 @@ fn request(direction: Direction) -> PlanRequest {
         learned: Learned::default(),
         preload: q16(50_000_000),
         distance: q16(22_000_000),
+        speed: Q16::ZERO,
         review: None,
         slipped: None,
     }
