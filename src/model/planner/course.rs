@@ -92,10 +92,11 @@ impl Planner {
         let along = |position: Millimetres| if forward { -position } else { position };
         let braking = self.timing.brake_distance(scene.cruise, approach.window_speed);
         let looks = approach.window_from + braking;
-        let from = match scene.direction {
-            Direction::Deploy => self.touch_at + self.radius * ROLL_IN,
-            Direction::Retract => self.radius * ROLL_IN,
+        let touches = match scene.direction {
+            Direction::Deploy => self.touch_at,
+            Direction::Retract => Q16::ZERO,
         };
+        let mut from = touches + self.radius * ROLL_IN;
         let mut drive = Drive {
             direction: scene.direction,
             axial: Axial::Driven(scene.load),
@@ -104,17 +105,19 @@ impl Planner {
             scale: scene.scale,
             level: false,
         };
-        // A wheel that is close and not at cruise speed goes on from where it then is.
+        // A wheel that is close and not at cruise speed goes on from where it then is; one at rest
+        // has no tread to roll in.
         let goes_on = scene.distance - scene.speed * ticks_to_seconds(PLAN_TICKS);
         let reach = looks + self.timing.brake_distance(scene.cruise, Q16::ZERO);
-        let (before, start, speed) = if let Some(starts) = scene.starts {
-            (starts, scene.distance.max(from), Q16::ZERO)
-        } else if scene.speed < scene.cruise && goes_on < reach {
-            (ticks_to_seconds(PLAN_TICKS), goes_on.max(from), scene.speed)
+        let (before, start, speed, steady) = if let Some(starts) = scene.starts {
+            from = from.min(scene.distance).max(touches);
+            (starts, scene.distance.max(from), Q16::ZERO, Q16::MAX)
+        } else if scene.speed < scene.cruise && goes_on < reach && goes_on > touches {
+            (ticks_to_seconds(PLAN_TICKS), goes_on.max(from), scene.speed, goes_on)
         } else {
             let start = looks.max(from);
             let rolls = (scene.distance - start).max(Q16::ZERO);
-            (divide(rolls, scene.cruise), start, scene.cruise)
+            (divide(rolls, scene.cruise), start, scene.cruise, Q16::MAX)
         };
         let mut reacts_at = None;
         let mut preload = |ticks: u32, felt: bool| {
@@ -146,6 +149,17 @@ impl Planner {
         for _ in 0..MOST_STRIDES {
             left += self.tread.stride();
             let mut ticks = 0;
+            // Up to where it goes on the tread rolls in.
+            if distance > steady {
+                left = Q16::ZERO;
+                drive.duration = divide(self.tread.stride(), follower.speed());
+                let contact = self.tread.advance(state, &drive);
+                lift.follow(&self.tread, scene.direction, &contact);
+                here = along(contact.position);
+                distance = here;
+                carried = contact.axial;
+                continue;
+            }
             while left > Q16::ZERO && ticks < MOST_TICKS {
                 let passed = follower.step(self, approach, scene, distance);
                 let travel = Q16::narrow(per_tick(follower.speed())) * Q16::from_num(passed);
