@@ -49,10 +49,18 @@ impl LiftOff {
         if self.strides > SETTLES {
             self.utilisation = self.utilisation.max(now.utilisation);
         }
-        let before = self.last.filter(|_| now.position < Q16::ZERO && !self.is_found());
+        let before = self.last.filter(|_| now.position < Q16::ZERO);
         self.last = (now.position < Q16::ZERO).then_some(*now);
         let Some(before) = before else { return };
         let [carried, carries] = [&before, now].map(|contact| contact.floor > Q16::ZERO);
+        // A wall that carries again has not been left: the last lift-off counts, and the first
+        // touch-down.
+        if self.is_found() {
+            if carries && direction == Direction::Deploy {
+                self.gap = Millimetres::ZERO;
+            }
+            return;
+        }
         let found = match direction {
             Direction::Deploy => carried && !carries,
             Direction::Retract => !carried && carries,
