@@ -246,6 +246,7 @@ impl Planner {
         plan: &mut Plan,
     ) {
         let learned = &request.learned;
+        let target = self.target(request.direction);
         let scene = self.scene(request, plan.cruise_speed);
         let floor = self.least_speed.min(plan.cruise_speed);
         // No faster than the pre-tightener can follow the spring over the corner.
@@ -265,7 +266,12 @@ impl Planner {
         } else {
             course
         };
-        let Course { approach, rolled } = course;
+        let Course { approach, mut rolled } = course;
+        // What a rising preload leaves too wide at any speed waits for all of it.
+        if rolled.rising && rolled.gap > target + target * SAME_GAP {
+            let raised = Scene { preload: scene.most, ..scene };
+            rolled = self.roll_out(state, &raised, &approach);
+        }
         let slowest = approach.slowest_speed;
         plan.approach = Approach { release_time: rolled.released, lift: rolled.lift, ..approach };
         plan.cross_speed = self.prescribed_speed.unwrap_or(rolled.speed.max(slowest));
@@ -282,7 +288,6 @@ impl Planner {
         let (friction, _) = self.friction_of(learned);
         plan.slip_margin = friction - rolled.utilisation;
         plan.short = rolled.utilisation + SAME_NEED >= learned.slips;
-        let target = self.target(request.direction);
         plan.limited_by = if moved {
             add(&mut plan.limits, Limit::ResonanceAvoided);
             LimitedBy::Resonance
