@@ -32,12 +32,20 @@ pub struct LiftOff {
     pub used_there: Ratio,
     /// The most friction needed so far.
     pub utilisation: Ratio,
+    wary: bool,
+    /// The largest `floor` so far, mm.
+    carried: Millimetres,
     /// The last stride's contact before the face, and the strides made.
     last: Option<Contact>,
     strides: u32,
 }
 
 impl LiftOff {
+    /// For a plan: a wall that was all but left counts as left there, even if it carries again.
+    pub fn wary() -> Self {
+        Self { wary: true, ..Self::default() }
+    }
+
     /// Whether it has come.
     pub fn is_found(&self) -> bool {
         self.gap > Q16::ZERO
@@ -53,10 +61,15 @@ impl LiftOff {
         self.last = (now.position < Q16::ZERO).then_some(*now);
         let Some(before) = before else { return };
         let [carried, carries] = [&before, now].map(|contact| contact.floor > Q16::ZERO);
+        self.carried = self.carried.max(before.floor);
+        let skims = self.wary && now.floor > before.floor && before.floor < self.carried * SKIMS;
+        if skims && !self.is_found() && direction == Direction::Deploy {
+            self.leave(tread, &before);
+        }
         // A wall that carries again has not been left: the last lift-off counts, and the first
         // touch-down.
         if self.is_found() {
-            if carries && direction == Direction::Deploy {
+            if carries && !self.wary && direction == Direction::Deploy {
                 self.gap = Millimetres::ZERO;
             }
             return;
@@ -74,12 +87,21 @@ impl LiftOff {
                 }
             };
             let mix = |a: Q16, b: Q16| a + part * (b - a);
-            self.position = mix(before.position, now.position);
-            self.centre = mix(before.centre, now.centre);
-            self.used_there = mix(before.utilisation, now.utilisation);
-            let (x, y) = (self.position, self.centre);
-            self.gap = sqrt(x * x + y * y) - tread.radius();
+            let there = Contact {
+                position: mix(before.position, now.position),
+                centre: mix(before.centre, now.centre),
+                utilisation: mix(before.utilisation, now.utilisation),
+                ..*now
+            };
+            self.leave(tread, &there);
         }
+    }
+
+    fn leave(&mut self, tread: &Tread, there: &Contact) {
+        (self.position, self.centre) = (there.position, there.centre);
+        self.used_there = there.utilisation;
+        let (x, y) = (self.position, self.centre);
+        self.gap = sqrt(x * x + y * y) - tread.radius();
     }
 }
 
@@ -143,6 +165,10 @@ pub fn roll(
     }
     rolled
 }
+
+/// Part of what the lower wall carried below which a tread as much stiffer would have left it: two
+/// deviations of a tread that is known best.
+const SKIMS: Ratio = q16(40_000);
 
 /// Strides after which a wheel that was put down rolls.
 const SETTLES: u32 = 8;

@@ -141,7 +141,7 @@ impl Planner {
         drive.pressed = preload(ticks_in_all, false) + scene.arm_thrust;
         self.tread.put_down(state, along(from), &drive);
         let mut rolled = RolledOut { from: start, ..RolledOut::default() };
-        let mut lift = LiftOff::default();
+        let mut lift = LiftOff::wary();
         let (mut per_tread, mut left) = (Q16::ONE, Q16::ZERO);
         let mut carried = Q16::ZERO;
         let mut overshot = Q16::ZERO;
