@@ -161,7 +161,7 @@ impl Schedule {
         needed: Seconds,
     ) -> MillimetresPerSecond {
         let held = needed - plan.approach.release_time;
-        let release = distance - plan.approach.release_from;
+        let release = distance - plan.approach.release_from.max(plan.approach.lift);
         if held <= Q16::ZERO {
             Q16::MAX
         } else if release > Q16::ZERO {

@@ -266,12 +266,7 @@ impl Planner {
         } else {
             course
         };
-        let Course { approach, mut rolled } = course;
-        // What a rising preload leaves too wide at any speed waits for all of it.
-        if rolled.rising && rolled.gap > target + target * SAME_GAP {
-            let raised = Scene { preload: scene.most, ..scene };
-            rolled = self.roll_out(state, &raised, &approach);
-        }
+        let Course { approach, rolled } = course;
         let slowest = approach.slowest_speed;
         plan.approach = Approach { release_time: rolled.released, lift: rolled.lift, ..approach };
         plan.cross_speed = self.prescribed_speed.unwrap_or(rolled.speed.max(slowest));

@@ -71,7 +71,7 @@ impl Controller {
         let mut targets = self.schedule.targets(self.estimator.steps(), &plan, &course);
         let (step, cross_speed) = (plan.step, plan.cross_speed);
         let (cross_preload, ramp_preload) = (plan.cross_preload, plan.ramp_preload);
-        let most_preload = plan.most_preload;
+        let (most_preload, slowest_speed) = (plan.most_preload, plan.approach.slowest_speed);
         let needs = plan.brake_horizon + plan.approach.window_from.abs();
         state.approach.ramping = targets.ramping;
         state.approach.begun = targets.begun;
@@ -87,9 +87,12 @@ impl Controller {
         if surprised || unplanned {
             targets.preload = if surprised { cross_preload } else { ramp_preload };
         }
+        if surprised {
+            targets.speed = targets.speed.min(slowest_speed);
+        }
         // Without its plan a step that is near is come to as the last one was crossed.
         let near = self.estimator.distance(&state.estimate).is_some_and(|ahead| ahead <= needs);
-        if surprised || unplanned && near {
+        if unplanned && near {
             targets.speed = targets.speed.min(cross_speed);
         }
         state.approach.sped_up &= !state.estimate.critical();

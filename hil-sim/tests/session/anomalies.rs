@@ -111,7 +111,10 @@ fn a_displaced_step_is_found_reported_once_and_crossed_like_any_other() {
         let got = outcome(&scenario);
         let name = format!("{} {anomaly:?}", direction.name());
         assert!(got.completed(), "{name}: {got:?}");
-        assert_safe(&got, &scenario, 0.09, &name);
+        // Met early, the first step outwards is crossed with the preload that there is.
+        let first = matches!(anomaly, StepAnomaly::Early { step: 1, .. });
+        let unready = *direction == Direction::Deploy && first;
+        assert_safe(&got, &scenario, if unready { 0.12 } else { 0.09 }, &name);
         assert_eq!(got.codes, [code(*direction, *anomaly)], "{name}");
         // On retraction the last step's record is closed 14 mm behind it: its position may be
         // reported by the end of the run alone.

@@ -88,7 +88,8 @@ impl<'a, P: AsyncFnMut()> Search<'a, P> {
     /// The fastest course.
     pub(super) async fn fastest(&mut self) -> Course {
         let planner = self.planner;
-        let fastest = planner.cruise_speed.min(planner.climb_speed);
+        let fastest =
+            planner.prescribed_speed.unwrap_or(planner.cruise_speed.min(planner.climb_speed));
         // As fast as it goes.
         let at_once = self.roll(fastest, Q16::ZERO, self.ceiling).await;
         if self.fits(&at_once.rolled) && self.price(&at_once.rolled) == Q16::ZERO {
@@ -281,6 +282,9 @@ impl<'a, P: AsyncFnMut()> Search<'a, P> {
         let (window, release_from) = if self.releases {
             let (travel, _) = planner.timing.build_up(slowest_speed);
             (planner.tolerance.half(), self.lift + travel + release)
+        } else if planner.prescribed_speed.is_some() {
+            // Only where lift-off shows.
+            (planner.tolerance, Q16::MIN)
         } else {
             (planner.tolerance, self.lift)
         };
