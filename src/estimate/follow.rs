@@ -39,6 +39,9 @@ pub struct Follow<'a> {
     pub limited_by: Option<LimitedBy>,
 }
 
+/// Age of a reading of the arm from which it counts as silent: at a reading each tick, two missing.
+const SILENT_TICKS: u32 = 2;
+
 impl Estimator {
     /// Load on a tread at rest that is compressed by so much, N.
     pub fn means(&self, compression: Millimetres) -> Newtons {
@@ -90,7 +93,7 @@ impl Estimator {
             }
         }
         self.feel(state, tick.sensed);
-        self.hold_to_corner(state, tick.sensed);
+        self.hold_to_corner(state, tick);
         if state.watch.contact == Contact::Wall || state.known.is_searching() {
             let (travel, compression) = (tick.sensed.travel, tick.sensed.compression_filtered);
             let (speed, duty, pressed) = (tick.sensed.speed.value, tick.duty, tick.pressed);
@@ -242,7 +245,15 @@ impl Estimator {
 
     /// Takes the place from the corner under a wheel that slips on it. Nearer to the edge than a
     /// quarter of the wheel's radius the height hardly shows the distance.
-    fn hold_to_corner(&self, state: &mut EstimateState, sensed: &SensedState) {
+    fn hold_to_corner(&self, state: &mut EstimateState, tick: &Follow<'_>) {
+        let sensed = tick.sensed;
+        // An arm that is silent stands still beside a tread that turns, as under a slip.
+        if sensed.radius.age(tick.now) > SILENT_TICKS {
+            if let Some(open) = state.crossing.as_mut() {
+                open.slip.begin_run();
+            }
+            return;
+        }
         match (state.watch.contact, state.direction) {
             (Contact::Wall, _) | (Contact::Leaving, Direction::Deploy) => return,
             _ => {}
