@@ -263,7 +263,7 @@ mod tests {
 
     use super::*;
     use crate::scenario::Scenario;
-    use crate::session;
+    use crate::session::{self, RunningRig};
 
     fn stream() -> &'static [u8] {
         static STREAM: OnceLock<Vec<u8>> = OnceLock::new();
@@ -328,7 +328,7 @@ mod tests {
                 let given = if session.mode() == Mode::Idle { left.take() } else { None };
                 session.step(given).unwrap();
             }
-            bytes.extend(session.take_stream());
+            bytes.extend(session.take_log(false));
             session.restart();
         }
         let run = Run::of_stream(&bytes);

@@ -196,7 +196,7 @@ impl Reader {
 mod tests {
     use super::*;
     use crate::record::{write_csv, write_mcap};
-    use crate::session;
+    use crate::session::{self, RunningRig};
     use interstage::supervise::{Command, Mode};
 
     fn record(ticks: &[u32]) -> Result<Record, IdentifyError> {

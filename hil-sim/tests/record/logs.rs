@@ -12,7 +12,7 @@ use hil_sim::record::write_mcap;
 use hil_sim::record::{Decoder, Item, Mark, Run};
 use hil_sim::replay::replay;
 use hil_sim::scenario::Scenario;
-use hil_sim::session::{Options, Session};
+use hil_sim::session::{Options, RunningRig, Session};
 use hil_sim::testing::long;
 use interstage::log::TICKS_PER_FRAME;
 use interstage::rig::Rig;
@@ -90,7 +90,7 @@ fn an_hour_of_deploying_and_retracting_is_logged_without_a_gap() {
             let truth = session.plant().truth();
             truths.push_back((truth.position_mm, truth.preload_n));
             session.step(command).expect("runs");
-            let bytes = session.take_stream();
+            let bytes = session.take_log(false);
             largest = largest.max(bytes.len());
             decoder.read(&bytes, &mut |item| match item {
                 Item::Tick(record, _) => {
