@@ -44,6 +44,11 @@ pub struct Options {
     pub speed: Option<(f64, bool)>,
 }
 
+impl Options {
+    /// Rows are kept.
+    pub const ROWS: Self = Self { rows: true, speed: None };
+}
+
 /// Why a run could not be made.
 #[derive(Debug, thiserror::Error)]
 pub enum RunError {

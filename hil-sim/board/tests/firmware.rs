@@ -48,8 +48,7 @@ fn rows(recording: &Recording) -> Vec<Controller> {
 /// gave the command in the tick `command`.
 fn software(scenario: &Scenario, first: u32, command: u32) -> Recording {
     let start = starter(scenario.run.direction);
-    let options = Options { rows: true, ..Options::default() };
-    let mut session = Session::new(scenario, options).expect("a session");
+    let mut session = Session::new(scenario, Options::ROWS).expect("a session");
     // The bench reads the sensors as power comes up too.
     for _ in 0..=first {
         session.sense();

@@ -47,8 +47,7 @@ fn a_run_in_the_loop_is_the_run_in_software_bit_for_bit() {
         let scenario = scenario(sets);
         let mut port = board();
         let board = looped(&mut port, &scenario).expect("a run");
-        let options = session::Options { rows: true, ..session::Options::default() };
-        let software = session::run(&scenario, options).expect("a run");
+        let software = session::run(&scenario, session::Options::ROWS).expect("a run");
         let (seen, wanted) = (&board.summary, &software.summary);
         assert!(seen.completed && seen.faults.is_empty(), "{:?}", seen.faults);
         assert_eq!((seen.target.as_str(), wanted.target.as_str()), ("board", "sil"));
@@ -182,14 +181,7 @@ impl Rigged {
 
     /// A millisecond of both.
     fn tick(&mut self, line: &mut HostLine<'_>, tick: u32, command: Option<Command>) -> Taken {
-        let codes = session::read(&mut self.sensors, &self.plant);
-        self.given = Given::codes(
-            codes.wheel_encoder,
-            codes.preload_sensor,
-            codes.compression_sensor,
-            codes.arm_angle,
-            codes.bridges,
-        );
+        self.given = session::read(&mut self.sensors, &self.plant).into();
         let taken = line.tick(tick, self.given.with(command)).expect("goes");
         let (drive, preload) = taken.commands();
         self.plant.step(&session::drives(drive, preload), 1e-3).expect("moves");

@@ -80,7 +80,7 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     }
     let campaign = args.campaign()?;
     if args.target == "board" && !args.campaign.is_given() {
-        return Ok(Outcome::Code(crate::provision::go_on(crate::provision::Extra::Board)?));
+        return Err(Failure::Elsewhere(crate::provision::Extra::Board));
     }
     carry_out(args, &campaign, twin, watched)
 }

@@ -240,8 +240,7 @@ mod tests {
     use crate::session;
 
     fn run() -> Recording {
-        let options = session::Options { rows: true, ..session::Options::default() };
-        session::run(&Scenario::default(), options).unwrap()
+        session::run(&Scenario::default(), session::Options::ROWS).unwrap()
     }
 
     #[test]

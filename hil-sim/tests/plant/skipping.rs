@@ -48,7 +48,7 @@ fn a_run_is_the_same_with_skipping_and_without() {
         let all = made(Options::default(), true);
         assert_eq!((&usual.summary, &usual.log), (&all.summary, &all.log));
         // Recording rows changes nothing either.
-        let rows = made(Options { rows: true, ..Options::default() }, false);
+        let rows = made(Options::ROWS, false);
         assert_eq!((&usual.summary, &usual.log), (&rows.summary, &rows.log));
         assert!(usual.rows.is_empty() && !rows.rows.is_empty());
     }

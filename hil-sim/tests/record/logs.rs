@@ -156,8 +156,7 @@ fn found(file: &Path) -> Value {
 fn python_reads_the_files_by_the_schemas_inside() {
     let directory = tempfile::tempdir().expect("a directory");
     let path = directory.path().join("log.mcap");
-    let options = Options { rows: true, ..Options::default() };
-    let recording = hil_sim::session::run(&Scenario::default(), options).expect("a run");
+    let recording = hil_sim::session::run(&Scenario::default(), Options::ROWS).expect("a run");
     write_mcap(&recording, &path).expect("written");
     let found = found(&path);
     let counts = &found["counts"];
