@@ -27,6 +27,19 @@ pub mod params;
 mod parse;
 #[cfg(feature = "probe")]
 mod probe;
+#[cfg(not(feature = "probe"))]
+mod probe {
+    use super::{Extra, Failure};
+    use crate::probe::ReconnectingPort;
+
+    pub(super) fn attach(_: Option<u32>) -> Result<ReconnectingPort<'static>, Failure> {
+        Err(Failure::Elsewhere(Extra::Probe))
+    }
+
+    pub(super) fn reconnecting() -> Result<ReconnectingPort<'static>, Failure> {
+        attach(None)
+    }
+}
 pub mod replay;
 mod report;
 pub mod scenario;
@@ -130,7 +143,7 @@ impl Verb {
             Self::Sweep(args) => sweep::run(args),
             Self::Test(args) => test::run(args),
             Self::Modes(_) | Self::Bench(_) | Self::Paper(_) => {
-                Ok(Outcome::Code(provision::go_on(Extra::Study)?))
+                Err(Failure::Elsewhere(Extra::Study))
             }
         }
     }
@@ -165,10 +178,11 @@ pub fn run<C: Parser>(run: impl FnOnce(&C) -> Result<Outcome, Failure>) -> ExitC
         Ok(cli) => cli,
         Err(error) => return parse::report(&error),
     };
-    match run(&cli) {
-        Ok(outcome) => outcome.code(),
-        Err(failure) => failed(&failure),
-    }
+    let outcome = run(&cli).or_else(|failure| match failure {
+        Failure::Elsewhere(part) => Ok(Outcome::Code(provision::go_on(part)?)),
+        failure => Err(failure),
+    });
+    outcome.map_or_else(|failure| failed(&failure), Outcome::code)
 }
 
 #[cfg(test)]

@@ -39,6 +39,19 @@ pub enum RecordFound {
     Gone,
 }
 
+/// When faults came and acted, s since boot; of a task that is made to hang, and of a save that
+/// is interrupted, all are the time of that.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct FaultTimes {
+    /// The first fault came.
+    pub struck_s: Option<f64>,
+    /// A fault first changed the duty of an actuator; other faults act as soon as they come.
+    pub acts_s: Option<f64>,
+    /// The same, where a fault of a bridge counts only from a difference of duty on that the
+    /// readback must show.
+    pub shows_s: Option<f64>,
+}
+
 /// The faults of a run and their states.
 pub struct FaultInjector {
     faults: Vec<Active>,
@@ -116,25 +129,18 @@ impl FaultInjector {
         })
     }
 
-    /// When the first fault came, s since boot.
-    pub fn struck_s(&self) -> Option<f64> {
-        self.first(|fault| fault.since_s)
-    }
-
-    fn first(&self, time: impl Fn(&Active) -> Option<f64>) -> Option<f64> {
-        self.faults.iter().filter_map(time).min_by(f64::total_cmp)
-    }
-
-    /// When a fault first changed the duty of an actuator, s since boot; other faults act as
-    /// soon as they come.
-    pub fn acts_s(&self) -> Option<f64> {
-        self.first(Active::acts_s)
-    }
-
-    /// The same, where a fault of a bridge counts only from a difference of duty on that the
-    /// readback must show.
-    pub fn tells_s(&self) -> Option<f64> {
-        self.first(|fault| if fault.is_in_bridge() { fault.shows_s } else { fault.acts_s() })
+    /// When the faults came and acted.
+    pub fn times(&self) -> FaultTimes {
+        let first = |time: fn(&Active) -> Option<f64>| {
+            self.faults.iter().filter_map(time).min_by(f64::total_cmp)
+        };
+        let shows =
+            |fault: &Active| if fault.is_in_bridge() { fault.shows_s } else { fault.acts_s() };
+        FaultTimes {
+            struck_s: first(|fault| fault.since_s),
+            acts_s: first(Active::acts_s),
+            shows_s: first(shows),
+        }
     }
 
     /// Begins a tick: faults start and end.

@@ -16,6 +16,7 @@ pub mod precision;
 pub mod rig;
 pub mod ring;
 pub mod rolling;
+pub mod section;
 pub mod sensors;
 pub mod spread;
 pub mod wall;

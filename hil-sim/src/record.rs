@@ -18,7 +18,6 @@ mod recording;
 mod run;
 mod source;
 mod summary;
-mod tally;
 pub mod tick;
 mod time_lost;
 mod view;

@@ -263,15 +263,14 @@ mod tests {
 
     use super::*;
     use crate::scenario::Scenario;
-    use crate::session;
+    use crate::session::{self, RunningRig};
 
     fn stream() -> &'static [u8] {
         static STREAM: OnceLock<Vec<u8>> = OnceLock::new();
         STREAM.get_or_init(|| {
             let sets = ["run.seed=4".to_owned()];
             let scenario = Scenario::resolve(Some("prototype"), None, &sets).unwrap();
-            let options = session::Options { rows: true, ..session::Options::default() };
-            session::run(&scenario, options).unwrap().stream
+            session::run(&scenario, session::Options::ROWS).unwrap().stream
         })
     }
 
@@ -319,8 +318,7 @@ mod tests {
     #[test]
     fn a_start_from_the_record_of_the_run_before_is_run_again_from_there() {
         let scenario = Scenario::resolve(Some("prototype"), None, &[]).unwrap();
-        let options = session::Options { rows: true, ..session::Options::default() };
-        let mut session = session::Session::new(&scenario, options).unwrap();
+        let mut session = session::Session::new(&scenario, session::Options::ROWS).unwrap();
         let mut bytes = Vec::new();
         for _ in 0..2 {
             let mut left = Some(interstage::supervise::Command::Start);
@@ -328,7 +326,7 @@ mod tests {
                 let given = if session.mode() == Mode::Idle { left.take() } else { None };
                 session.step(given).unwrap();
             }
-            bytes.extend(session.take_stream());
+            bytes.extend(session.take_log(false));
             session.restart();
         }
         let run = Run::of_stream(&bytes);

@@ -18,6 +18,7 @@ use toml::{Table, Value};
 
 use crate::plant::draw::PlantParameters;
 use crate::plant::mismatch::Mismatch;
+use crate::plant::section::Section;
 use crate::plant::spread::{Noise, Spread};
 
 pub use error::ScenarioError;

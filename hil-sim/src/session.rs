@@ -11,8 +11,9 @@ use interstage::rig::{Rig, RigError};
 use interstage::supervise::{Command, Mode};
 use interstage::tick::Output;
 
+use crate::injector::FaultTimes;
 use crate::plant::limits::Refusal;
-use crate::plant::rig::PlantError;
+use crate::plant::rig::{PlantError, VirtualRig};
 use crate::record::{Recording, starter};
 use crate::scenario::{ControllerKind, Scenario};
 
@@ -43,6 +44,11 @@ pub struct Options {
     pub speed: Option<(f64, bool)>,
 }
 
+impl Options {
+    /// Rows are kept.
+    pub const ROWS: Self = Self { rows: true, speed: None };
+}
+
 /// Why a run could not be made.
 #[derive(Debug, thiserror::Error)]
 pub enum RunError {
@@ -69,6 +75,29 @@ impl From<ControllerKind> for Strategy {
             ControllerKind::Reactive => Self::Reactive,
         }
     }
+}
+
+/// A controller and its rig, a millisecond a step: in software, or on the emulated board.
+pub trait RunningRig {
+    type Error;
+
+    /// One millisecond with an operator's command or none; what the controller puts out.
+    fn step(&mut self, command: Option<Command>) -> Result<Output, Self::Error>;
+
+    /// Mode of the controller.
+    fn mode(&self) -> Mode;
+
+    /// Time since boot, s.
+    fn time_s(&self) -> f64;
+
+    fn plant(&self) -> &VirtualRig;
+
+    /// When the scenario's faults came and acted.
+    fn fault_times(&self) -> FaultTimes;
+
+    /// The binary log since the last call, up to its `end` if the run is over; empty if it is not
+    /// kept.
+    fn take_log(&mut self, end: bool) -> Vec<u8>;
 }
 
 /// Runs a scenario to its end: arrival, fault hold, or time. The operator presses the

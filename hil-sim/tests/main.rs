@@ -1,6 +1,7 @@
 //! All tests of this crate that need more than one of its modules: one program.
 
 mod browser;
+mod budget;
 mod campaigns;
 mod cli;
 mod commands;

@@ -6,13 +6,13 @@
 
 use super::chip::Motor;
 use super::error::{BoardError, ImageError};
-use super::fault_injector::{BoardInjector, FaultTimes, Saving};
+use super::fault_injector::{BoardInjector, Saving};
 use super::log::{Line, Reader, Strings};
 use super::machine::Machine;
 use super::peripherals::HZ;
 use super::peripherals::rcc::Cause;
 use super::rtt::Probe;
-use hil_sim::injector::FaultInjector;
+use hil_sim::injector::{FaultInjector, FaultTimes};
 use hil_sim::plant::rig::{Drives, VirtualRig};
 use hil_sim::plant::sensors::{Codes, Sensors};
 use hil_sim::record::{letter, starter};
@@ -39,8 +39,9 @@ pub struct Passed {
 
 /// A board and its plant.
 pub struct Bench<'a> {
-    machine: Machine,
-    plant: VirtualRig,
+    /// The board.
+    pub machine: Machine,
+    pub plant: VirtualRig,
     sensors: Sensors,
     probe: Probe,
     reader: Reader<'a>,
@@ -56,8 +57,8 @@ pub struct Bench<'a> {
     frames: Option<Vec<u8>>,
     /// The faults of the scenario, if it has some.
     injector: Option<BoardInjector>,
-    /// Between the pins and the plant.
-    wiring: Wiring,
+    /// Between the pins and the plant; [`Bench::connect`] applies a change of it.
+    pub wiring: Wiring,
     /// The letter that starts the drive.
     start: u8,
     /// The drive starts when it is idle.
@@ -234,19 +235,10 @@ impl<'a> Bench<'a> {
         self.starts
     }
 
-    /// The wiring, for a hand at it; [`Bench::connect`] applies the change.
-    pub const fn wiring_mut(&mut self) -> &mut Wiring {
-        &mut self.wiring
-    }
-
     /// Applies the wiring to the chip's pins.
     pub fn connect(&mut self) {
         let now = self.machine.now();
         self.wiring.connect(self.machine.chip_mut(), now);
-    }
-
-    pub const fn wiring(&self) -> &Wiring {
-        &self.wiring
     }
 
     /// A hand holds the board in reset for so many milliseconds.
@@ -311,28 +303,9 @@ impl<'a> Bench<'a> {
         self.frames = listen.then(|| self.take_frames());
     }
 
-    /// The board.
-    pub const fn machine(&self) -> &Machine {
-        &self.machine
-    }
-
-    /// The board, to be changed.
-    pub fn machine_mut(&mut self) -> &mut Machine {
-        &mut self.machine
-    }
-
-    /// The board alone.
-    pub fn into_machine(self) -> Machine {
-        self.machine
-    }
-
     /// When the scenario's faults struck and acted.
     pub(crate) fn fault_times(&self) -> FaultTimes {
         self.injector.as_ref().map(BoardInjector::times).unwrap_or_default()
-    }
-
-    pub const fn plant(&self) -> &VirtualRig {
-        &self.plant
     }
 
     /// Time since power came up, s.

@@ -27,7 +27,7 @@ pub struct Attended<'a> {
 impl<'a> Attended<'a> {
     /// This bench, its motor supply switched off.
     pub fn new(mut bench: Bench<'a>) -> Self {
-        bench.wiring_mut().switched_off = true;
+        bench.wiring.switched_off = true;
         Self { bench: Rc::new(RefCell::new(bench)), usb: None, owed: 0 }
     }
 
@@ -55,7 +55,7 @@ impl<'a> Attended<'a> {
 }
 
 fn tread_mm(bench: &Bench<'_>) -> f64 {
-    let plant = bench.plant();
+    let plant = &bench.plant;
     plant.truth().rotation_rad * plant.parameters().ring.radius_mm
 }
 
@@ -106,7 +106,7 @@ impl<O: Operator> Operator for Person<'_, O> {
     fn act(&mut self, action: Action) -> Result<(), BringupError> {
         let mut bench = self.bench.borrow_mut();
         self.tread_mm = tread_mm(&bench);
-        let wiring = bench.wiring_mut();
+        let wiring = &mut bench.wiring;
         match action {
             Action::SwitchOn => wiring.switched_off = false,
             Action::PressStop => wiring.stop_pressed = true,
@@ -133,7 +133,7 @@ impl<O: Operator> Operator for Person<'_, O> {
             Question::Turned => moved,
             Question::MovedInReset if moved == Seen::Nothing => Seen::Nothing,
             Question::MovedInReset => Seen::Yes,
-            Question::Supplied if bench.wiring().is_supplied() => Seen::Yes,
+            Question::Supplied if bench.wiring.is_supplied() => Seen::Yes,
             Question::Supplied => Seen::Nothing,
         })
     }

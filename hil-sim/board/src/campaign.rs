@@ -14,7 +14,7 @@ use interstage::supervise::{Command, Mode};
 use interstage::tick::{Entry, Event, Output};
 use interstage::units::Q16;
 
-use crate::bench::{Bench, Passed};
+use crate::bench::Bench;
 use crate::chip::Pin;
 use crate::chip::map::PARAMETER_SETS;
 use crate::error::BoardError;
@@ -23,16 +23,18 @@ use crate::log::Strings;
 use crate::peripherals::rcc::Cause;
 use crate::run::store;
 use hil_sim::faults::campaign::operator::Operator;
-use hil_sim::faults::campaign::twin::Twin;
 use hil_sim::faults::campaign::{
-    AFTER_S, FaultCampaign, Instant, Outcome, crossed, doing, longest_s,
+    AFTER_S, FaultCampaign, Instant, Outcome, Twin, crossed, doing, longest_s,
 };
 use hil_sim::faults::judge::{Finding, Judge};
 use hil_sim::faults::sets;
+use hil_sim::injector::FaultTimes;
 use hil_sim::params::set_of;
+use hil_sim::plant::rig::{Drives, VirtualRig};
 use hil_sim::record::{Run, letter};
 use hil_sim::scenario::Scenario;
 use hil_sim::scenario::injection::{Injection, Kind, Target};
+use hil_sim::session::RunningRig;
 use parameters::Parameters;
 use restart::Hold;
 
@@ -69,9 +71,11 @@ pub fn run(
     campaign.on("board", &rigs, watched).complete(done)
 }
 
-/// A running board.
-struct Board<'a> {
+/// A running board, seen from outside.
+pub struct Board<'a> {
     bench: Bench<'a>,
+    /// Mean commands at its bridges over the last millisecond.
+    drives: Drives,
     /// Address of the first snapshot of the restart record.
     record: u32,
     /// Mode and speed in the last snapshot.
@@ -96,12 +100,14 @@ struct Board<'a> {
 }
 
 impl<'a> Board<'a> {
-    fn new(firmware: Firmware<'a>, scenario: &Scenario) -> Result<Self, BoardError> {
+    /// A board with this image and the scenario's parameters, off.
+    pub fn new(firmware: Firmware<'a>, scenario: &Scenario) -> Result<Self, BoardError> {
         let mut bench = Bench::new(firmware.elf, firmware.strings, scenario)?;
-        store(bench.machine_mut(), scenario)?;
-        let record = bench.machine().image().symbol(RECORD)?;
+        store(&mut bench.machine, scenario)?;
+        let record = bench.machine.image().symbol(RECORD)?;
         Ok(Self {
             bench,
+            drives: Drives::default(),
             record: record + 4 * CRASH_WORDS as u32,
             mode: Mode::Boot,
             speed: Q16::ZERO,
@@ -117,9 +123,41 @@ impl<'a> Board<'a> {
         })
     }
 
-    /// Runs a millisecond. Returns the controller's output as far as the judge needs it, and
-    /// the board's inputs and outputs.
-    fn step(&mut self, command: Option<Command>) -> Result<(Output, Passed), BoardError> {
+    /// Snapshot of the latest tick since the board started.
+    fn snapshot(&self) -> Result<Option<DriveSnapshot>, BoardError> {
+        let read = |place: u32| -> Result<Option<DriveSnapshot>, BoardError> {
+            let mut words = [0; SNAPSHOT_WORDS];
+            for (at, word) in (0..).zip(&mut words) {
+                let address = self.record + 4 * (place * SNAPSHOT_WORDS as u32 + at);
+                *word = self.bench.machine.word(address)?;
+            }
+            Ok(DriveSnapshot::open(&words))
+        };
+        let snapshot = later(read(0)?, read(1)?);
+        // A snapshot from before the restart is excluded.
+        Ok(snapshot.filter(|snapshot| u64::from(snapshot.tick) <= self.up + AHEAD))
+    }
+
+    /// Cause of the first restart, if the board reported every restart.
+    fn restart(&self) -> Option<&'static str> {
+        let (_, cause) = self.bench.machine.restarts().first()?;
+        let events = Run::of_stream(&self.frames).events;
+        let reports = events.iter().filter(|entry| matches!(entry.event, Event::Restart(_)));
+        // The first power-up is reported as well.
+        (self.restart_lines > 0 || reports.count() > self.restarts).then_some(match cause {
+            Cause::Power => "reset by supply",
+            Cause::Pin => "reset by pin",
+            Cause::Software => "reset by software",
+            Cause::Watchdog => "reset by watchdog",
+        })
+    }
+}
+
+impl RunningRig for Board<'_> {
+    type Error = BoardError;
+
+    /// The output is what the judge needs of it.
+    fn step(&mut self, command: Option<Command>) -> Result<Output, BoardError> {
         self.pending = command.or(self.pending);
         if let Some(pending) = self.pending
             && self.bench.send(letter(pending))?
@@ -127,9 +165,10 @@ impl<'a> Board<'a> {
             self.pending = None;
         }
         let (passed, lines) = self.bench.step()?;
+        self.drives = passed.drives;
         self.frames.extend(self.bench.take_frames());
         self.up += 1;
-        let restarts = self.bench.machine().restarts().len();
+        let restarts = self.bench.machine.restarts().len();
         if restarts > std::mem::replace(&mut self.restarts, restarts) {
             (self.mode, self.speed, self.up) = (Mode::Boot, Q16::ZERO, 0);
             self.parameters = Parameters::default();
@@ -137,7 +176,7 @@ impl<'a> Board<'a> {
         }
         self.has_logged |= !lines.is_empty();
         // Before the first line of a start, the light is on for a damaged image only.
-        if self.restarts > 0 && !self.has_logged && self.bench.machine().chip().level(Pin::LIGHT) {
+        if self.restarts > 0 && !self.has_logged && self.bench.machine.chip().level(Pin::LIGHT) {
             self.light_s.get_or_insert(self.bench.time_s());
         }
         let mut output = Output::default();
@@ -172,58 +211,33 @@ impl<'a> Board<'a> {
         }
         output.telemetry.mode = self.mode;
         output.telemetry.speed_ref = self.speed;
-        Ok((output, passed))
+        Ok(output)
     }
 
-    /// Snapshot of the latest tick since the board started.
-    fn snapshot(&self) -> Result<Option<DriveSnapshot>, BoardError> {
-        let read = |place: u32| -> Result<Option<DriveSnapshot>, BoardError> {
-            let mut words = [0; SNAPSHOT_WORDS];
-            for (at, word) in (0..).zip(&mut words) {
-                let address = self.record + 4 * (place * SNAPSHOT_WORDS as u32 + at);
-                *word = self.bench.machine().word(address)?;
-            }
-            Ok(DriveSnapshot::open(&words))
-        };
-        let snapshot = later(read(0)?, read(1)?);
-        // A snapshot from before the restart is excluded.
-        Ok(snapshot.filter(|snapshot| u64::from(snapshot.tick) <= self.up + AHEAD))
+    fn mode(&self) -> Mode {
+        self.mode
     }
 
-    /// Cause of the first restart, if the board reported every restart.
-    fn restart(&self) -> Option<&'static str> {
-        let (_, cause) = self.bench.machine().restarts().first()?;
-        let events = Run::of_stream(&self.frames).events;
-        let reports = events.iter().filter(|entry| matches!(entry.event, Event::Restart(_)));
-        // The first power-up is reported as well.
-        (self.restart_lines > 0 || reports.count() > self.restarts).then_some(match cause {
-            Cause::Power => "reset by supply",
-            Cause::Pin => "reset by pin",
-            Cause::Software => "reset by software",
-            Cause::Watchdog => "reset by watchdog",
-        })
+    fn time_s(&self) -> f64 {
+        self.bench.time_s()
+    }
+
+    fn plant(&self) -> &VirtualRig {
+        &self.bench.plant
+    }
+
+    fn fault_times(&self) -> FaultTimes {
+        self.bench.fault_times()
+    }
+
+    fn take_log(&mut self, _: bool) -> Vec<u8> {
+        std::mem::take(&mut self.frames)
     }
 }
 
 /// The run without the fault.
 pub fn twin(firmware: Firmware<'_>, scenario: &Scenario) -> Result<Twin, BoardError> {
-    let mut board = Board::new(firmware, scenario)?;
-    let mut operator = Operator::default();
-    let mut twin = Twin::new(scenario).map_err(|error| BoardError::Scenario(error.to_string()))?;
-    let mut over_s = 0.0;
-    let longest_s = longest_s(&scenario.rig);
-    while board.bench.time_s() < longest_s && over_s < AFTER_S {
-        let t_s = board.bench.time_s();
-        let command = operator.command(board.mode);
-        if !operator.started() {
-            twin.started_s = t_s;
-        }
-        let (output, _) = board.step(command)?;
-        let over = operator.over(board.mode);
-        twin.note(t_s, board.mode, &output, over);
-        over_s = if over { over_s + 1e-3 } else { 0.0 };
-    }
-    Ok(twin)
+    Twin::run(Board::new(firmware, scenario)?, scenario, AFTER_S)
 }
 
 /// A run with its fault, compared with its twin.
@@ -233,7 +247,7 @@ pub fn watched(
     twin: &Twin,
 ) -> Result<Instant, BoardError> {
     let mut board = Board::new(firmware, scenario)?;
-    let mut judge = Judge::new(scenario, board.bench.plant().truth());
+    let mut judge = Judge::new(scenario, board.plant().truth());
     let mut operator = Operator::default();
     let reset = scenario.run.faults.first().is_some_and(Injection::resets_board);
     let mut hold = reset.then(|| store_kept(&mut board, scenario)).transpose()?;
@@ -244,21 +258,21 @@ pub fn watched(
     let (mut during, mut after_s) = (None, 0.0);
     let (mut worst_mm, mut back_s) = (0.0f64, None);
     let longest_s = longest_s(&scenario.rig);
-    while board.bench.time_s() < longest_s && after_s < AFTER_S {
-        let t_s = board.bench.time_s();
+    while board.time_s() < longest_s && after_s < AFTER_S {
+        let t_s = board.time_s();
         let before = board.mode;
         // During a save of parameters the operator gives no command.
         let free = board.bench.saving() != Some(Saving::Writing);
         let command = if free { operator.command(before) } else { None };
-        let (output, passed) = board.step(command)?;
+        let output = board.step(command)?;
         if let Some(hold) = &mut hold {
-            hold.look(&board, &passed, command);
+            hold.look(&board, command);
         }
-        let struck = early || board.bench.fault_times().struck_s.is_some();
+        let struck = early || board.fault_times().struck_s.is_some();
         if struck && !early && during.is_none() {
             during = Some(doing(before));
         }
-        let truth = board.bench.plant().truth();
+        let truth = board.plant().truth();
         judge.look(t_s, &output, truth, struck);
         if board.mode.moves() {
             worst_mm = worst_mm.max(truth.separation_mm);
@@ -278,7 +292,7 @@ pub fn watched(
         };
         after_s = if over { after_s + 1e-3 } else { 0.0 };
     }
-    let (gap_part, crossed) = crossed(board.bench.plant(), twin, worst_mm);
+    let (gap_part, crossed) = crossed(&board.bench.plant, twin, worst_mm);
     if scenario.run.faults.first().is_some_and(|fault| fault.target.is_of_start()) {
         return parameters::judged(board, judge, scenario, twin, (gap_part, crossed));
     }
@@ -293,7 +307,7 @@ pub fn watched(
         _ => Finding::Undetected,
     };
     let report = judge.report(&twin.limits);
-    let times = board.bench.fault_times();
+    let times = board.fault_times();
     let reported_s = match report {
         Some((at_s, _)) => Some(at_s),
         None => board.image_s.or(board.light_s).or(back_s).filter(|_| restart.is_some()),
@@ -311,7 +325,7 @@ pub fn watched(
         during: during.unwrap_or("at rest").into(),
         finding,
         restart: restart.map(Into::into),
-        latency_ms: since(times.visible_s).or(since(times.acts_s).map(|_| 0.0)),
+        latency_ms: since(times.shows_s).or(since(times.acts_s).map(|_| 0.0)),
         end: if board.image_s.is_some() { "hold".into() } else { judged.end },
         harms,
         ..judged
@@ -322,6 +336,6 @@ pub fn watched(
 fn store_kept(board: &mut Board<'_>, scenario: &Scenario) -> Result<Hold, BoardError> {
     let set = set_of(sets::KEPT, &scenario.rig)?;
     let place = slots::slot_image(&set, 7).ok_or(CompileError::Room)?;
-    board.bench.machine_mut().poke(PARAMETER_SETS, &place)?;
+    board.bench.machine.poke(PARAMETER_SETS, &place)?;
     Ok(Hold::new(place.to_vec()))
 }

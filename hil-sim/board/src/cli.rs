@@ -9,17 +9,17 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 use hil_sim::cli::failure::{Failure, Outcome};
 use hil_sim::cli::{bringup, capture, faults, live, output, params};
-use hil_sim::faults::campaign::twin::Twin;
+use hil_sim::faults::campaign::Twin;
 use hil_sim::firmware::{self, Profile, build_binary};
 use hil_sim::params::Client;
 use hil_sim::progress;
+use hil_sim::record::Virtual;
 use hil_sim::scenario::Scenario;
 use serde::Serialize;
 
 use crate::bench::Bench;
 use crate::bringup::Attended;
-use crate::campaign::{self, Firmware};
-use crate::capture::Emulated;
+use crate::campaign::{self, Board, Firmware};
 use crate::cycles::{self, Step, TickCycles};
 use crate::image::Image;
 use crate::load;
@@ -113,15 +113,25 @@ fn bring_up(args: &bringup::Args) -> Result<Outcome, Failure> {
 fn capture(args: &capture::Args) -> Result<Outcome, Failure> {
     let scenario = args.source.scenario()?;
     let (elf, strings) = image(&scenario)?;
-    let mut source = Emulated::new(&elf, &strings, &scenario, false).map_err(Failure::run)?;
-    capture::write(args, &mut source, &scenario)
+    capture::write(args, &mut emulated(&elf, &strings, &scenario, false)?, &scenario)
 }
 
 fn live(args: &live::Args) -> Result<Outcome, Failure> {
     let scenario = args.source.scenario()?;
     let (elf, strings) = image(&scenario)?;
-    let source = Emulated::new(&elf, &strings, &scenario, !args.headless);
-    live::watch(args, &mut source.map_err(Failure::run)?, &scenario)
+    let mut source = emulated(&elf, &strings, &scenario, !args.headless)?;
+    live::watch(args, &mut source, &scenario)
+}
+
+/// The board as a source of its log.
+fn emulated<'a>(
+    elf: &'a [u8],
+    strings: &'a Strings,
+    scenario: &Scenario,
+    attended: bool,
+) -> Result<Virtual<Board<'a>>, Failure> {
+    let board = Board::new(Firmware { elf, strings }, scenario).map_err(Failure::run)?;
+    Ok(Virtual::of(board, scenario, attended))
 }
 
 fn faults(args: &faults::Args) -> Result<Outcome, Failure> {

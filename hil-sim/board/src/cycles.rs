@@ -12,7 +12,7 @@ use crate::image::{ARGUMENTS, Image};
 use crate::spread::Spread;
 use hil_sim::record::starter;
 use hil_sim::scenario::{Direction, Scenario};
-use hil_sim::session::{Options, RunError, Session};
+use hil_sim::session::{Options, RunError, RunningRig, Session};
 
 /// Package and binary of the measuring image.
 pub const IMAGE: (&str, &str) = ("interstage-images", "measure");

@@ -3,6 +3,7 @@
 use hil_sim::firmware::FirmwareError;
 use hil_sim::plant::rig::PlantError;
 use interstage::params::CompileError;
+use interstage::rig::RigError;
 
 use crate::core::CoreError;
 
@@ -48,9 +49,9 @@ pub enum BoardError {
     /// The firmware has one controller.
     #[error("the firmware schedules: --controller {0} runs in software alone")]
     Controller(String),
-    /// The scenario's parameters.
-    #[error("{0}")]
-    Scenario(String),
+    /// The parameters make no planner.
+    #[error(transparent)]
+    Rig(#[from] RigError),
     /// The rig cannot be put into the board's flash.
     #[error(transparent)]
     Parameters(#[from] CompileError),

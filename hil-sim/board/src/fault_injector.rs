@@ -20,7 +20,7 @@ use super::machine::Machine;
 use super::peripherals::HZ;
 use super::peripherals::flash::{Cut, Wrong};
 use hil_sim::faults::sets;
-use hil_sim::injector::FaultInjector;
+use hil_sim::injector::{FaultInjector, FaultTimes};
 use hil_sim::params::set_of;
 use hil_sim::plant::rig::VirtualRig;
 use hil_sim::plant::sensors::Codes;
@@ -36,18 +36,6 @@ pub(crate) use save::Saving;
 const INTO_POLL: u64 = 100;
 /// Milliseconds to wait for one poll function before the next is tried.
 const PATIENCE: u32 = 20;
-
-/// When faults struck and acted, s since power-up. For a hanging task, all are the time at
-/// which it was made to hang; for a save, the time at which it was interrupted.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct FaultTimes {
-    /// The first fault struck.
-    pub(crate) struck_s: Option<f64>,
-    /// It first had an effect, see [`FaultInjector::acts_s`].
-    pub(crate) acts_s: Option<f64>,
-    /// The readback could first show it, see [`FaultInjector::tells_s`].
-    pub(crate) visible_s: Option<f64>,
-}
 
 /// The faults of a run, and their progress.
 pub(super) struct BoardInjector {
@@ -231,12 +219,11 @@ impl BoardInjector {
 
     /// When the faults struck and acted.
     pub(super) fn times(&self) -> FaultTimes {
-        let faults = &self.faults;
-        let times = match self.waits {
-            true => [self.struck_later_s; 3],
-            false => [faults.struck_s(), faults.acts_s(), faults.tells_s()],
-        };
-        FaultTimes { struck_s: times[0], acts_s: times[1], visible_s: times[2] }
+        let later_s = self.struck_later_s;
+        match self.waits {
+            true => FaultTimes { struck_s: later_s, acts_s: later_s, shows_s: later_s },
+            false => self.faults.times(),
+        }
     }
 }
 

@@ -5,7 +5,6 @@ pub mod accelerator;
 pub mod bench;
 pub mod bringup;
 pub mod campaign;
-pub mod capture;
 pub mod chip;
 pub mod cli;
 pub mod core;

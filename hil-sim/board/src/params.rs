@@ -31,7 +31,7 @@ pub fn start(elf: &[u8], flash: &Path) -> Result<Bench<'static>, StoreError> {
                 bytes.len()
             )));
         }
-        bench.machine_mut().poke(PARAMETER_SETS, &bytes).map_err(|error| wire(&error))?;
+        bench.machine.poke(PARAMETER_SETS, &bytes).map_err(|error| wire(&error))?;
     }
     for _ in 0..START_MS {
         let (_, lines) = bench.step().map_err(|error| wire(&error))?;
@@ -48,7 +48,7 @@ pub fn start(elf: &[u8], flash: &Path) -> Result<Bench<'static>, StoreError> {
 pub fn keep(board: &Bench<'_>, flash: &Path) -> Result<(), StoreError> {
     let mut bytes = vec![0; 2 * SLOT_BYTES];
     board
-        .machine()
+        .machine
         .peek(PARAMETER_SETS, &mut bytes)
         .map_err(|error| StoreError::Wire(error.to_string()))?;
     fs::write(flash, bytes).map_err(|source| failed(flash, source))

@@ -33,7 +33,8 @@ impl Usb {
 
 /// An emulated board with nothing at its pins.
 pub struct EmulatedPort {
-    machine: Machine,
+    /// The board.
+    pub machine: Machine,
     probe: Probe,
     /// Its accesses take time.
     usb: Option<Usb>,
@@ -60,16 +61,6 @@ impl EmulatedPort {
 
     fn run(&mut self, cycles: u64) -> Result<(), PortError> {
         self.machine.run_on(self.machine.now() + cycles).map_err(gone)
-    }
-
-    /// The board.
-    pub const fn machine(&self) -> &Machine {
-        &self.machine
-    }
-
-    /// The board, to be changed.
-    pub fn machine_mut(&mut self) -> &mut Machine {
-        &mut self.machine
     }
 }
 
@@ -134,7 +125,7 @@ impl Port for Bench<'_> {
     }
 
     fn memory(&mut self, address: u32, into: &mut [u8]) -> Result<(), PortError> {
-        let machine = self.machine_mut();
+        let machine = &mut self.machine;
         if address < PERIPHERALS {
             return machine.peek(address, into).map_err(gone);
         }

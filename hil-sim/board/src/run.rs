@@ -96,9 +96,9 @@ pub fn run_with(
     let footprint = Footprint::of_elf(elf)?;
     let strings = Strings::of(elf)?;
     let mut bench = Bench::new(elf, &strings, scenario)?;
-    store(bench.machine_mut(), scenario)?;
+    store(&mut bench.machine, scenario)?;
     if options.wait_states {
-        bench.machine_mut().count_waits()?;
+        bench.machine.count_waits()?;
     }
     let (mut log, mut lines_of_log) = (JoinedLog::new(0), Vec::new());
     bench.start_when_idle();
@@ -109,8 +109,8 @@ pub fn run_with(
     let mut ends_at = longest_s(&scenario.rig);
     while bench.time_s() < ends_at && after > 0 {
         let waited = bench.waits_to_start();
-        let restarts = bench.machine().restarts().len();
-        log.add(bench.plant().truth());
+        let restarts = bench.machine.restarts().len();
+        log.add(bench.plant.truth());
         let t_s = bench.time_s();
         let (_, lines) = bench.step()?;
         for line in &lines {
@@ -120,12 +120,12 @@ pub fn run_with(
             lines_of_log.push(LogLine { t_s, text });
         }
         if waited && !bench.waits_to_start() {
-            gathered.begin(bench.machine_mut());
+            gathered.begin(&mut bench.machine);
         } else {
-            gathered.gather(bench.machine_mut());
+            gathered.gather(&mut bench.machine);
         }
         let frames = bench.take_frames();
-        if bench.machine().restarts().len() > restarts {
+        if bench.machine.restarts().len() > restarts {
             log.restarted();
             if !waited {
                 // It starts with the drive at rest and waits for a command.
@@ -140,10 +140,10 @@ pub fn run_with(
     }
     let wall_s = started.elapsed().as_secs_f64();
     let arrived = (log.mode() == Some(COMPLETE)).then_some(scenario.run.direction.into());
-    let of = (scenario, bench.plant());
+    let of = (scenario, &bench.plant);
     let recording = log.finish("board", of, arrived, options.rows, wall_s);
     let recording = Recording { log: lines_of_log, stream, ..recording };
-    let machine = bench.into_machine();
+    let machine = bench.machine;
     let stack = stack_used(&machine)?;
     let load = gathered.close(&machine, &footprint, stack);
     Ok(Ran { recording, load, machine })

@@ -71,7 +71,7 @@ fn faults_on_the_board_are_detected_or_tolerated_and_every_bound_is_kept() {
 #[test]
 fn damage_that_only_the_light_reports_is_found() {
     let bench = Bench::new(elf(), strings(), &Scenario::default()).expect("a bench");
-    let functions = &bench.machine().image().functions;
+    let functions = &bench.machine.image().functions;
     let copies = functions.iter().find(|f| f.name == "compiler_builtins::mem::memcpy");
     let bit = f64::from(8 * (copies.expect("it copies").range.start + 0x115 - 0x0800_0000) + 4);
     let image = HARDWARE.iter().find(|entry| entry.target == Target::Image).expect("an image");
@@ -115,7 +115,7 @@ fn a_scenario_can_damage_a_stored_set_and_restart_the_board() {
     let scenario = Scenario::parse("bench.toml", text, &[]).expect("a scenario");
     let mut bench = Bench::new(elf(), strings(), &scenario).expect("a bench");
     let places = sets::places(&scenario).expect("sets");
-    bench.machine_mut().poke(PARAMETER_SETS, &places).expect("flash");
+    bench.machine.poke(PARAMETER_SETS, &places).expect("flash");
     let mut said = Vec::new();
     for _ in 0..1500 {
         let (passed, lines) = bench.step().expect("runs");

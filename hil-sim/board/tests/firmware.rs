@@ -4,7 +4,7 @@ use hil_sim::plant::rig::Drives;
 use hil_sim::record::{Controller, CrossingLine, Recording, Run, starter};
 use hil_sim::scenario::Scenario;
 use hil_sim::scenario::injection::{Injection, Kind, Target};
-use hil_sim::session::{Options, Session};
+use hil_sim::session::{Options, RunningRig, Session};
 use interstage::model::LimitedBy::{Preload, Slew};
 use interstage::restart::{Reset, Restart};
 use interstage::supervise::Mode;
@@ -22,7 +22,7 @@ fn press(board: &mut Board, pressed: bool) {
 }
 
 fn assert_no_strays(board: &Board) {
-    let strays: Vec<_> = board.bench.machine().chip().strays().iter().collect();
+    let strays: Vec<_> = board.bench.machine.chip().strays().iter().collect();
     assert!(strays.is_empty(), "{strays:#?}");
 }
 
@@ -48,8 +48,7 @@ fn rows(recording: &Recording) -> Vec<Controller> {
 /// gave the command in the tick `command`.
 fn software(scenario: &Scenario, first: u32, command: u32) -> Recording {
     let start = starter(scenario.run.direction);
-    let options = Options { rows: true, ..Options::default() };
-    let mut session = Session::new(scenario, options).expect("a session");
+    let mut session = Session::new(scenario, Options::ROWS).expect("a session");
     // The bench reads the sensors as power comes up too.
     for _ in 0..=first {
         session.sense();
@@ -248,7 +247,7 @@ fn an_open_emergency_stop_takes_the_drive_away_until_it_is_reset() {
     board.until("deploying: cruise", 4000);
     board.run(100);
     let open = |board: &mut Board, open| {
-        let now = board.bench.machine().now();
+        let now = board.bench.machine.now();
         for pin in [Pin::STOP_DRIVE, Pin::STOP_PRELOAD] {
             board.machine().chip_mut().drive(pin, open, now);
         }
@@ -325,7 +324,7 @@ fn a_broken_sensor_under_way_stops_the_drive_with_a_fault() {
         let (mut board, lines) = struck("deploying: approach", fault, 1500);
         assert!(lines.iter().any(|line| line.contains("] fault ")), "{fault:?}: {lines:#?}");
         assert!(!drives(&mut board, 300), "{fault:?}");
-        assert!(board.bench.machine().restarts().is_empty(), "{fault:?}: the tasks live on");
+        assert!(board.bench.machine.restarts().is_empty(), "{fault:?}: the tasks live on");
     }
 }
 
@@ -350,7 +349,7 @@ fn bit_errors_that_pass_are_ridden_out() {
 #[test]
 fn the_image_contains_no_function_of_a_mathematics_library() {
     let board = Board::off(&[]);
-    let functions = &board.bench.machine().image().functions;
+    let functions = &board.bench.machine.image().functions;
     assert!(functions.len() > 100);
     let of_library = |name: &str| {
         ["libm::", "micromath::", "::float::", "::math::"].iter().any(|part| name.contains(part))

@@ -38,7 +38,7 @@ impl Board {
     fn idle() -> Self {
         let scenario = Scenario::resolve(Some("prototype"), None, &[]).expect("a scenario");
         let bench = Bench::new(elf(), strings(), &scenario).expect("a bench");
-        let probe = Probe::of(bench.machine()).expect("a control block");
+        let probe = Probe::of(&bench.machine).expect("a control block");
         let mut board = Self { bench, probe, reader: FrameReader::new(), number: 0 };
         board.until("mode: idle");
         board
@@ -58,7 +58,7 @@ impl Board {
     }
 
     fn restarts(&self) -> usize {
-        self.bench.machine().restarts().len()
+        self.bench.machine.restarts().len()
     }
 
     /// Sends a request; no response if the board restarts first.
@@ -68,7 +68,7 @@ impl Board {
         let frame = frame(&ToBoard::Parameters(self.number, request)).expect("fits");
         let mut sent = 0;
         while sent < frame.len() {
-            sent += self.probe.down(self.bench.machine_mut(), DOWN, &frame[sent..]).expect("runs");
+            sent += self.probe.down(&mut self.bench.machine, DOWN, &frame[sent..]).expect("runs");
             if sent < frame.len() {
                 self.bench.step().expect("runs");
             }
@@ -79,7 +79,7 @@ impl Board {
                 self.reader = FrameReader::new();
                 return None;
             }
-            for byte in self.probe.up(self.bench.machine_mut(), UP).expect("runs") {
+            for byte in self.probe.up(&mut self.bench.machine, UP).expect("runs") {
                 if let Some(ToHost::Parameters(number, response)) = self.reader.take(byte)
                     && number == self.number
                 {
@@ -113,7 +113,7 @@ impl Board {
     }
 
     fn operations(&self) -> u64 {
-        self.bench.machine().chip().flash.begun()
+        self.bench.machine.chip().flash.begun()
     }
 }
 
@@ -124,10 +124,10 @@ fn a_stored_set_is_active_after_a_loss_of_power() {
     assert!(board.store(&set()));
     let stored = (Origin::Stored { sequence: 1 }, "changed".to_owned());
     assert_eq!(board.active(), stored);
-    board.bench.machine_mut().restart(Cause::Power).expect("restarts");
+    board.bench.machine.restart(Cause::Power).expect("restarts");
     board.until("mode: idle");
     assert_eq!(board.active(), stored);
-    let strays = board.bench.machine().chip().strays().count();
+    let strays = board.bench.machine.chip().strays().count();
     assert_eq!(strays, 0);
 }
 
@@ -137,7 +137,7 @@ fn a_damaged_set_stops_the_drive_until_the_fault_is_reset() {
     let mut board = Board::idle();
     assert!(board.store(&set()));
     let place = PARAMETER_SETS + 2 * PIECE as u32;
-    board.bench.machine_mut().spoil(place, Wrong::Check).expect("flash");
+    board.bench.machine.spoil(place, Wrong::Check).expect("flash");
     board.active();
     board.until("fault 151");
     // A fault is held for a tenth of a second at least.
@@ -162,7 +162,7 @@ fn power_lost_in_any_write_leaves_the_old_set_or_the_new() {
     for cut in [1, 2, 3, 4, all / 2, all - 2, all - 1, all] {
         for cut in [Cut::Within(cut), Cut::After(cut)] {
             let mut board = Board::idle();
-            board.bench.machine_mut().chip_mut().flash.cut_power(cut);
+            board.bench.machine.chip_mut().flash.cut_power(cut);
             // If the last write was over, the answer may yet have been sent.
             let done = board.store(&set) && board.restarts() == 0;
             if board.restarts() == 0 {

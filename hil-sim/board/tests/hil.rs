@@ -47,8 +47,7 @@ fn a_run_in_the_loop_is_the_run_in_software_bit_for_bit() {
         let scenario = scenario(sets);
         let mut port = board();
         let board = looped(&mut port, &scenario).expect("a run");
-        let options = session::Options { rows: true, ..session::Options::default() };
-        let software = session::run(&scenario, options).expect("a run");
+        let software = session::run(&scenario, session::Options::ROWS).expect("a run");
         let (seen, wanted) = (&board.summary, &software.summary);
         assert!(seen.completed && seen.faults.is_empty(), "{:?}", seen.faults);
         assert_eq!((seen.target.as_str(), wanted.target.as_str()), ("board", "sil"));
@@ -67,14 +66,14 @@ fn a_run_in_the_loop_is_the_run_in_software_bit_for_bit() {
         assert!(replay(&run, &Rig::prototype()).expect("a sound rig").is_equal());
         // Nothing but the host's side was driven, and the watchdog never bit.
         bridges_have_no_power(&mut port);
-        assert_eq!(port.machine().restarts().len(), 1, "the reset before the run");
+        assert_eq!(port.machine.restarts().len(), 1, "the reset before the run");
     }
 }
 
 /// Neither PWM nor enable lines were ever driven.
 fn bridges_have_no_power(port: &mut EmulatedPort) {
-    let now = port.machine().now();
-    for motor in port.machine_mut().chip_mut().take_motors(now) {
+    let now = port.machine.now();
+    for motor in port.machine.chip_mut().take_motors(now) {
         assert_eq!((motor.duty, motor.enabled), (0.0, 0.0));
     }
 }
@@ -182,14 +181,7 @@ impl Rigged {
 
     /// A millisecond of both.
     fn tick(&mut self, line: &mut HostLine<'_>, tick: u32, command: Option<Command>) -> Taken {
-        let codes = session::read(&mut self.sensors, &self.plant);
-        self.given = Given::codes(
-            codes.wheel_encoder,
-            codes.preload_sensor,
-            codes.compression_sensor,
-            codes.arm_angle,
-            codes.bridges,
-        );
+        self.given = session::read(&mut self.sensors, &self.plant).into();
         let taken = line.tick(tick, self.given.with(command)).expect("goes");
         let (drive, preload) = taken.commands();
         self.plant.step(&session::drives(drive, preload), 1e-3).expect("moves");
@@ -221,7 +213,7 @@ fn a_host_that_falls_silent_leaves_the_bridges_off() {
     // A second of nothing.
     let mut stream = Vec::new();
     for _ in 0..1000 {
-        let machine = port.machine_mut();
+        let machine = &mut port.machine;
         let until = machine.now() + 170_000;
         machine.run_on(until).expect("runs");
         stream.extend(port.up(1).expect("reads"));
@@ -252,7 +244,7 @@ fn a_host_that_falls_silent_leaves_the_bridges_off() {
     );
     assert!(rows[held..].iter().all(|row| !row.drive_on && !row.pretightener_on));
     // What is still driven are ticks that ran: the watchdog has not bitten.
-    assert_eq!(port.machine().restarts().len(), 1);
+    assert_eq!(port.machine.restarts().len(), 1);
     bridges_have_no_power(&mut port);
     // A host that comes back gets an error, and has to start again.
     let next = FIRST + 3000;
@@ -303,9 +295,9 @@ fn an_image_is_known_by_its_hash() {
 #[test]
 fn without_a_host_the_pins_are_low_a_watchdog_runs_and_the_log_says_that_nothing_moves() {
     let mut port = board();
-    port.machine_mut().chip_mut().defects.drive_bridge_floats = true;
+    port.machine.chip_mut().defects.drive_bridge_floats = true;
     let mut wait = |milliseconds: u64| {
-        let machine = port.machine_mut();
+        let machine = &mut port.machine;
         machine.run_on(machine.now() + milliseconds * STEP).expect("runs");
         let now = machine.now();
         machine.chip_mut().take_motors(now)
@@ -314,8 +306,8 @@ fn without_a_host_the_pins_are_low_a_watchdog_runs_and_the_log_says_that_nothing
     for motor in wait(300) {
         assert_eq!((motor.duty, motor.enabled), (0.0, 0.0), "low");
     }
-    assert!(port.machine().chip().watchdog.is_started());
-    assert_eq!(port.machine().restarts(), []);
+    assert!(port.machine.chip().watchdog.is_started());
+    assert_eq!(port.machine.restarts(), []);
     let strings = Strings::of(elf()).expect("it logs");
     let lines = strings.reader().read(&port.up(0).expect("runs"));
     assert!(lines.iter().any(|line| line.text.contains("moves no motor")), "{lines:?}");

@@ -27,7 +27,7 @@ const CHECKED_MS: u32 = 12_500;
 
 fn page(board: &Board, address: u32) -> Vec<u8> {
     let mut bytes = vec![0; PAGE_BYTES];
-    board.bench.machine().peek(address, &mut bytes).expect("flash");
+    board.bench.machine.peek(address, &mut bytes).expect("flash");
     bytes
 }
 
@@ -87,7 +87,7 @@ fn a_record_of_the_supply_is_written_in_half_of_its_time() {
         let mut board = Board::moving();
         board.machine().poke(RECORDS, &vec![0; filled]).expect("flash");
         board.strike(Fault::BrownOut);
-        let fell = board.bench.machine().now();
+        let fell = board.bench.machine.now();
         // The record's last word is the lower one of its third double word.
         let written = |board: &Board| page(board, RECORDS)[filled + 16..filled + 20] != [0xFF; 4];
         while !written(&board) {
@@ -96,7 +96,7 @@ fn a_record_of_the_supply_is_written_in_half_of_its_time() {
             assert!(now - fell < HOLDS / 2, "{filled}: not yet");
             machine.run_on(now + STEP / 100).expect("runs");
         }
-        let took_ms = (board.bench.machine().now() - fell) as f64 / STEP as f64;
+        let took_ms = (board.bench.machine.now() - fell) as f64 / STEP as f64;
         assert!((0.2..0.4).contains(&took_ms), "{filled}: {took_ms} ms");
     }
 }
@@ -260,7 +260,7 @@ fn the_first_start_of_an_image_stores_its_checksum() {
 
 /// Bytes of the image: of its vectors, its code, its constants, its hash.
 fn places(board: &Board) -> Vec<u32> {
-    let image = board.bench.machine().image();
+    let image = board.bench.machine.image();
     let last = image.flash.iter().rposition(|byte| *byte != 0xFF).expect("an image") as u32;
     let hash = image.symbol("__build_id").expect("a symbol");
     vec![0x0800_0000 + 0x1D0, board.function("panic_bounds_check"), 0x0800_0000 + last, hash + 16]
@@ -292,7 +292,7 @@ fn an_inverted_bit_of_the_image_is_reported_and_held() {
 #[test]
 fn an_image_names_no_folder_of_the_machine_that_built_it() {
     let board = Board::idle();
-    let image = &board.bench.machine().image().flash;
+    let image = &board.bench.machine.image().flash;
     let holds = |text: &str| image.windows(text.len()).any(|bytes| bytes == text.as_bytes());
     assert!(holds("src/main.rs"), "places of panics are in it");
     let home = std::env::home_dir().expect("a home");
@@ -317,7 +317,7 @@ fn a_damaged_image_that_no_longer_starts_is_reported() {
 /// line of the log.
 #[test]
 fn a_damaged_image_that_cannot_log_blinks() {
-    let lit = |board: &Board| board.bench.machine().chip().level(Pin::LIGHT);
+    let lit = |board: &Board| board.bench.machine.chip().level(Pin::LIGHT);
     let mut board = Board::moving();
     board.strike(Fault::ResetPin);
     let from = board.log.len();
@@ -348,7 +348,7 @@ fn a_damaged_image_that_cannot_log_blinks() {
 #[test]
 fn the_first_code_of_a_start_uses_no_floating_point() {
     let board = Board::idle();
-    let image = board.bench.machine().image();
+    let image = board.bench.machine.image();
     let mut checked = 0;
     for name in
         ["__pre_init", "board::image::checksums", "interstage::restart::page::word", "Reset"]

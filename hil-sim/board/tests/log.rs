@@ -73,7 +73,7 @@ struct Ticks {
 
 impl Ticks {
     fn gather(&mut self, board: &mut Board) {
-        let machine = board.bench.machine_mut();
+        let machine = &mut board.bench.machine;
         let tick = machine.tasks().position(|name| name == "motors").expect("the tick");
         for turn in machine.profile_mut().take_polls().iter().filter(|turn| turn.task == tick) {
             self.cycles.push(turn.cycles);
@@ -107,7 +107,7 @@ impl Ticks {
 /// Has the image keep no tick for the log: the function that does returns at once.
 fn mute(board: &mut Board) {
     const BX_LR: [u8; 2] = [0x70, 0x47];
-    let machine = board.bench.machine_mut();
+    let machine = &mut board.bench.machine;
     let keeps = |name: &str| name.ends_with("exchange::Exchange::record");
     let found: Vec<u32> = machine
         .image()
@@ -130,7 +130,7 @@ fn deployment(reader: Reader) -> (u32, Crossings, Ticks) {
     }
     board.until("mode: idle", 3000);
     let (mut ticks, mut crossings) = (Ticks::default(), Vec::new());
-    board.bench.machine_mut().profile_mut().take_polls();
+    board.bench.machine.profile_mut().take_polls();
     board.send(b's');
     for millisecond in 0..8000 {
         if reader == Reader::Stalled {
@@ -234,7 +234,7 @@ fn a_restart_in_the_middle_is_marked_and_both_parts_run_again() {
     board.send(b's');
     board.until("deploying: crossing", 8000);
     // The record of the first run survives this restart.
-    board.bench.machine_mut().restart(Cause::Pin).expect("restarts");
+    board.bench.machine.restart(Cause::Pin).expect("restarts");
     board.until("mode: idle", 3000);
     board.send(b's');
     board.until("mode: deployed", 12_000);
@@ -242,7 +242,7 @@ fn a_restart_in_the_middle_is_marked_and_both_parts_run_again() {
     board.until("mode: retracted", 12_000);
     board.send(b's');
     board.until("deploying: crossing", 8000);
-    board.bench.machine_mut().restart(Cause::Power).expect("restarts");
+    board.bench.machine.restart(Cause::Power).expect("restarts");
     board.until("mode: idle", 3000);
     board.run(200);
     let run = Run::of_stream(&board.frames);
@@ -302,8 +302,8 @@ fn minutes_of_deploying_and_retracting_are_logged_without_a_gap_or_drift() {
             assert!(millisecond < 20_000, "round {round} does not arrive");
             let (_, lines) = board.bench.step().expect("runs");
             // What the emulator books of the tasks is not the board's.
-            board.bench.machine_mut().profile_mut().take_polls();
-            let truth = board.bench.plant().truth();
+            board.bench.machine.profile_mut().take_polls();
+            let truth = board.bench.plant.truth();
             let now = (board.bench.time_s() * 1e3).round() as u32;
             truths.push_back((now, truth.position_mm, truth.preload_n));
             let frames = board.bench.take_frames();

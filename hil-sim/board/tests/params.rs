@@ -113,14 +113,14 @@ fn parameters_are_read_changed_saved_and_restored() {
 fn powered(flash: &[u8], milliseconds: u32) -> (Vec<String>, bool) {
     let strings = Strings::of(elf()).expect("it logs");
     let mut bench = Bench::new(elf(), &strings, &Scenario::default()).expect("a bench");
-    bench.machine_mut().poke(PARAMETER_SETS, flash).expect("flash");
+    bench.machine.poke(PARAMETER_SETS, flash).expect("flash");
     let (mut said, mut driven) = (Vec::new(), false);
     for _ in 0..milliseconds {
         let (passed, lines) = bench.step().expect("runs");
         driven |= passed.drives.drive_on || passed.drives.preload_on;
         said.extend(lines.into_iter().map(|line| line.text));
     }
-    assert!(bench.machine().restarts().is_empty(), "{said:?}");
+    assert!(bench.machine.restarts().is_empty(), "{said:?}");
     (said, driven)
 }
 

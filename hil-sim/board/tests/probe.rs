@@ -31,7 +31,7 @@ fn a_board_that_restarts_is_heard_again_and_gets_no_key_meanwhile() {
     let (mut port, mut reader) = (port(), strings().reader());
     assert!(heard(&mut port, &mut reader, "interstage", 600));
     assert_eq!(port.down(0, b"x"), Ok(1));
-    let machine = port.machine_mut();
+    let machine = &mut port.machine;
     machine.restart(Cause::Watchdog).expect("restarts");
     machine.run_on(machine.now() + 100 * rig_board::bench::STEP).expect("runs");
     assert_eq!(port.down(0, b"s"), Ok(0), "it looks at the run before");
@@ -46,7 +46,7 @@ fn a_board_that_restarts_is_heard_again_and_gets_no_key_meanwhile() {
 #[test]
 fn the_time_of_a_port_includes_that_of_its_accesses() {
     let mut port = port().on_usb();
-    let (before, since) = (port.machine().now(), port.now());
+    let (before, since) = (port.machine.now(), port.now());
     for _ in 0..50 {
         for _ in 0..10 {
             port.up(0).expect("reads");
@@ -54,7 +54,7 @@ fn the_time_of_a_port_includes_that_of_its_accesses() {
         port.pass().expect("runs");
     }
     let passed = port.now() - since;
-    let true_s = (port.machine().now() - before) as f64 / 170e6;
+    let true_s = (port.machine.now() - before) as f64 / 170e6;
     assert!(true_s > 0.37, "500 accesses, one of them long");
     assert!((passed.as_secs_f64() - true_s).abs() < 1e-3, "{passed:?} of {true_s} s");
 }

@@ -33,7 +33,7 @@ fn a_panic_is_reported_with_its_line_and_what_the_drive_did() {
     let panics = board.function("panic_bounds_check");
     // Index, length, and the address of some location.
     let place = 0x0800_1000;
-    let line = board.bench.machine().word(place + 8).expect("flash");
+    let line = board.bench.machine.word(place + 8).expect("flash");
     for (register, value) in [(Register::R(0), 7), (Register::R(1), 3), (Register::R(2), place)] {
         board.set(register, value);
     }

@@ -101,7 +101,7 @@ fn a_stack_that_overflows_ends_at_the_protection_whatever_lies_below_ram() {
         // Between two ticks the core sleeps, and nothing is popped first.
         let machine = board.machine();
         machine.run_on(machine.now() + HZ / 2500).expect("runs");
-        let end = board.bench.machine().image().symbol("_stack_end").expect("a symbol");
+        let end = board.bench.machine.image().symbol("_stack_end").expect("a symbol");
         if left == 0 {
             let push = board.function("interstage::tick::Controller::step_into");
             board.set(Register::Pc, push);
@@ -311,7 +311,7 @@ fn a_fault_after_a_long_halt_of_the_core_has_its_cause_before_it_in_the_log() {
 #[test]
 fn a_tick_that_hangs_loses_the_pwm_within_three_milliseconds() {
     let mut board = Board::moving();
-    while board.bench.plant().truth().tread_mm_s < 29.5 {
+    while board.bench.plant.truth().tread_mm_s < 29.5 {
         board.step();
     }
     let tick = board.function("interstage::tick::Controller::step_into");
@@ -361,11 +361,11 @@ fn dark() -> Bench<'static> {
             break;
         }
     }
-    let functions = &bench.machine().image().functions;
+    let functions = &bench.machine.image().functions;
     let copies = functions.iter().find(|f| f.name == "compiler_builtins::mem::memcpy");
     let place = copies.expect("it copies").range.start + 0x115;
-    Fault::BitFlip(place, 4).strike(bench.machine_mut()).expect("flash");
-    bench.machine_mut().restart(Cause::Pin).expect("restarts");
+    Fault::BitFlip(place, 4).strike(&mut bench.machine).expect("flash");
+    bench.machine.restart(Cause::Pin).expect("restarts");
     bench
 }
 
@@ -382,7 +382,7 @@ fn the_light_of_a_damaged_image_blinks_twice_a_second() {
     let mut rises = Vec::new();
     for _ in 0..600 {
         bench.step().expect("runs");
-        let chip = bench.machine_mut().chip_mut();
+        let chip = bench.machine.chip_mut();
         let clock = chip.rcc.read(CLOCK_IN_USE, 0).expect("a register") >> 2 & 3;
         time_s += STEP as f64 / CLOCKS_HZ[usize::from(clock != 1)];
         let on = chip.level(Pin::LIGHT);

@@ -10,6 +10,7 @@ use super::output;
 use crate::bringup::{self, Check, Line, Operator, Progress, Stdin};
 use crate::files::{make_directory, write_text};
 use crate::probe::Port;
+use crate::provision::Extra;
 use crate::scenario::{PRESETS, Scenario};
 
 /// Checks the wiring of a rig at its first power-up, stage by stage.
@@ -57,24 +58,12 @@ struct Printed<'a> {
 /// Runs the verb.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
     if args.target == "board" {
-        return Ok(Outcome::Code(crate::provision::go_on(crate::provision::Extra::Board)?));
+        return Err(Failure::Elsewhere(Extra::Board));
     }
     if !args.mistake.is_empty() {
         return Err(Failure::input("--mistake: only the emulated board has mistakes to choose"));
     }
-    on_probe(args)
-}
-
-#[cfg(not(feature = "probe"))]
-fn on_probe(_: &Args) -> Result<Outcome, Failure> {
-    Ok(Outcome::Code(crate::provision::go_on(crate::provision::Extra::Probe)?))
-}
-
-#[cfg(feature = "probe")]
-fn on_probe(args: &Args) -> Result<Outcome, Failure> {
-    let mut port = super::probe::reconnecting()?;
-    let mut operator = person(args);
-    carry_out(args, &mut port, &mut operator)
+    carry_out(args, &mut super::probe::reconnecting()?, &mut person(args))
 }
 
 /// The person at the terminal.

@@ -14,7 +14,7 @@ use super::source::TARGETS;
 use super::terminal;
 use crate::files::{vacant, write_text};
 use crate::firmware::FirmwareError;
-use crate::provision::{self, Extra};
+use crate::provision::Extra;
 use crate::record::{Recording, Summary};
 use crate::scenario::{Scenario, brief};
 use crate::{progress, record, report, session};
@@ -74,7 +74,7 @@ impl Args {
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let (scenario, directory) = args.resolve()?;
     match args.target.as_str() {
-        "board" => return Ok(Outcome::Code(provision::go_on(Extra::Board)?)),
+        "board" => return Err(Failure::Elsewhere(Extra::Board)),
         "probe" => return looped::on_probe(args, &scenario, directory.as_deref()),
         _ if args.hil => return Err(Failure::input("--hil: takes --target board")),
         _ => {}

@@ -9,7 +9,7 @@ use interstage::rig::RigError;
 use crate::files::FileError;
 use crate::firmware::FirmwareError;
 use crate::plant::balance::BalanceError;
-use crate::provision::ProvisionError;
+use crate::provision::{Extra, ProvisionError};
 use crate::scenario::ScenarioError;
 use crate::session::RunError;
 
@@ -46,6 +46,8 @@ pub enum Failure {
     Input(String),
     /// It failed while running: exit code 1.
     Run(String),
+    /// This part of `rig` does it, with the same arguments: [`super::run`] goes on there.
+    Elsewhere(Extra),
 }
 
 impl Failure {
@@ -62,15 +64,17 @@ impl Failure {
     pub fn code(&self) -> ExitCode {
         match self {
             Self::Input(_) => ExitCode::from(2),
-            Self::Run(_) => ExitCode::from(1),
+            Self::Run(_) | Self::Elsewhere(_) => ExitCode::from(1),
         }
     }
 }
 
 impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (Self::Input(text) | Self::Run(text)) = self;
-        f.write_str(&one_line(text))
+        match self {
+            Self::Input(text) | Self::Run(text) => f.write_str(&one_line(text)),
+            Self::Elsewhere(part) => write!(f, "{part:?} does it"),
+        }
     }
 }
 

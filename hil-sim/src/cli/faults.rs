@@ -9,9 +9,8 @@ use super::failure::{Failure, Outcome};
 use super::montecarlo;
 use super::scenario::ScenarioArgs;
 use crate::campaign::{Column, Frame, column};
-use crate::faults::campaign::twin::Twin;
 use crate::faults::campaign::{
-    Case, FaultCampaign, Instant, MatrixRow, Outcome as Matrix, watched,
+    Case, FaultCampaign, Instant, MatrixRow, Outcome as Matrix, Twin, twin, watched,
 };
 use crate::progress;
 use crate::scenario::{Scenario, nearest_word};
@@ -81,9 +80,9 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     }
     let campaign = args.campaign()?;
     if args.target == "board" && !args.campaign.is_given() {
-        return Ok(Outcome::Code(crate::provision::go_on(crate::provision::Extra::Board)?));
+        return Err(Failure::Elsewhere(crate::provision::Extra::Board));
     }
-    carry_out(args, &campaign, Twin::run, watched)
+    carry_out(args, &campaign, twin, watched)
 }
 
 /// Runs the campaign on the target that is asked for, and prints the outcome.

@@ -9,7 +9,8 @@ use toml::Value;
 use super::failure::{Failure, Outcome};
 use super::output;
 use crate::files::write_text;
-use crate::params::{Held, SetFile, Store, StoreError, set_of};
+use crate::params::{Client, Held, SetFile, Store, StoreError, set_of};
+use crate::provision::Extra;
 use crate::scenario::{KeyInfo, PRESETS, Scenario};
 use crate::table::plain;
 
@@ -97,25 +98,13 @@ struct Printed<'a> {
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
     match (&args.file, args.target.as_deref()) {
         (Some(file), _) => act(args, &mut SetFile::new(file)),
-        (None, Some("probe")) => on_probe(args),
-        (None, Some(_)) => {
-            Ok(Outcome::Code(crate::provision::go_on(crate::provision::Extra::Board)?))
-        }
+        (None, Some("probe")) => act(args, &mut Client::new(super::probe::attach(None)?)),
+        (None, Some(_)) => Err(Failure::Elsewhere(Extra::Board)),
         (None, None) => Err(Failure::input(
             "whose parameters? give --target probe (a real board), --target board (the \
                  emulated one) or --file FILE",
         )),
     }
-}
-
-#[cfg(not(feature = "probe"))]
-fn on_probe(_: &Args) -> Result<Outcome, Failure> {
-    Ok(Outcome::Code(crate::provision::go_on(crate::provision::Extra::Probe)?))
-}
-
-#[cfg(feature = "probe")]
-fn on_probe(args: &Args) -> Result<Outcome, Failure> {
-    act(args, &mut crate::params::Client::new(super::probe::attach(None)?))
 }
 
 /// Carries out the action on the parameters of this place.

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use super::failure::{Failure, Outcome};
 use super::scenario::RunArgs;
-use crate::provision::{self, Extra};
-use crate::record::{Bytes, Source, Virtual};
+use crate::provision::Extra;
+use crate::record::{Bytes, Probed, Source, Virtual};
 use crate::scenario::Scenario;
 
 /// What can run the controller.
@@ -43,8 +43,8 @@ impl SourceArgs {
         }
         match self.target.as_str() {
             "sil" => act(&mut Virtual::new(&scenario, attended)?, &scenario),
-            "board" => Ok(Outcome::Code(provision::go_on(Extra::Board)?)),
-            _ => probe(&scenario, act),
+            "board" => Err(Failure::Elsewhere(Extra::Board)),
+            _ => act(&mut Probed::new(super::probe::reconnecting()?), &scenario),
         }
     }
 
@@ -61,20 +61,4 @@ fn opened(path: &Path) -> Result<Bytes, Failure> {
     let name = path.display().to_string();
     let input = File::open(path).map_err(|error| Failure::input(format!("{name}: {error}")))?;
     Ok(Bytes::new(name, Box::new(input)))
-}
-
-#[cfg(not(feature = "probe"))]
-fn probe(
-    _: &Scenario,
-    _: impl FnOnce(&mut dyn Source, &Scenario) -> Result<Outcome, Failure>,
-) -> Result<Outcome, Failure> {
-    Ok(Outcome::Code(provision::go_on(Extra::Probe)?))
-}
-
-#[cfg(feature = "probe")]
-fn probe(
-    scenario: &Scenario,
-    act: impl FnOnce(&mut dyn Source, &Scenario) -> Result<Outcome, Failure>,
-) -> Result<Outcome, Failure> {
-    act(&mut crate::record::Probed::new(super::probe::reconnecting()?), scenario)
 }

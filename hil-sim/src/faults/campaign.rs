@@ -3,7 +3,7 @@
 mod case;
 mod matrix;
 pub mod operator;
-pub mod twin;
+mod twin;
 
 use std::borrow::Cow;
 
@@ -17,12 +17,12 @@ use crate::campaign::Campaign;
 use crate::plant::rig::VirtualRig;
 use crate::scenario::Scenario;
 use crate::scenario::injection::{Injection, Kind, Target};
-use crate::session::{self, Options, RunError, Session};
+use crate::session::{self, Options, RunError, RunningRig, Session};
 
 pub use case::Case;
 pub use matrix::{MatrixRow, MedianAndWorst, Outcome};
 use operator::Operator;
-use twin::Twin;
+pub use twin::Twin;
 
 /// How long a run is watched after its end, s.
 pub const AFTER_S: f64 = 1.0;
@@ -110,7 +110,7 @@ impl FaultCampaign {
     /// # Errors
     /// [`RunError`] if a run without a fault cannot be made.
     pub fn run(&self, done: &(dyn Fn() + Sync)) -> Result<Outcome, RunError> {
-        let rigs = self.rigs(Twin::run, done)?;
+        let rigs = self.rigs(twin, done)?;
         self.on("sil", &rigs, watched).complete(done)
     }
 
@@ -189,6 +189,14 @@ pub fn crossed(plant: &VirtualRig, twin: &Twin, worst_mm: f64) -> (f64, bool) {
     (parts.fold(worst_mm / out, f64::max), crossings.len() == 2 * steps)
 }
 
+/// Runs a scenario in software without a fault.
+///
+/// # Errors
+/// [`RunError`] if it cannot be made.
+pub fn twin(scenario: &Scenario) -> Result<Twin, RunError> {
+    Twin::run(Session::new(scenario, Options::default())?, scenario, 0.0)
+}
+
 /// Runs a scenario in software with its fault, beside its twin.
 ///
 /// # Errors
@@ -206,8 +214,9 @@ pub fn watched(scenario: &Scenario, twin: &Twin) -> Result<Instant, RunError> {
         let before = session.mode();
         let command = operator.command(before);
         let output = session.step(command)?;
-        let active = injection.is_none() || session.struck_s().is_some();
-        if session.struck_s() == Some(t_s) {
+        let struck_s = session.fault_times().struck_s;
+        let active = injection.is_none() || struck_s.is_some();
+        if struck_s == Some(t_s) {
             during = doing(before);
             if reset.is_some() {
                 operator.press_again();
@@ -223,13 +232,13 @@ pub fn watched(scenario: &Scenario, twin: &Twin) -> Result<Instant, RunError> {
     let (gap_part, crossed) = crossed(session.plant(), twin, worst_mm);
     let finding = judge.finding(&twin.limits, gap_part, crossed);
     let report = judge.report(&twin.limits);
-    let at_s = session.struck_s();
+    let times = session.fault_times();
     let since = |from_s: Option<f64>| {
         let ((to_s, _), from_s) = (report?, from_s?);
         Some(1e3 * (to_s - from_s).max(0.0))
     };
     Ok(Instant {
-        at_s,
+        at_s: times.struck_s,
         during: during.into(),
         finding,
         restart: reset.map(|kind| match kind {
@@ -237,7 +246,7 @@ pub fn watched(scenario: &Scenario, twin: &Twin) -> Result<Instant, RunError> {
             _ => "reset by supply".into(),
         }),
         // A report before the first effect has no latency.
-        latency_ms: since(session.tells_s()).or(since(session.acts_s()).map(|_| 0.0)),
+        latency_ms: since(times.shows_s).or(since(times.acts_s).map(|_| 0.0)),
         ..Instant::judged(scenario, &judge, twin, gap_part)
     })
 }

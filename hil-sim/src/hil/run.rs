@@ -9,7 +9,6 @@ use interstage::supervise::Mode;
 use interstage::units::Tick;
 
 use super::{HilError, HostLine};
-use crate::plant::sensors::Codes;
 use crate::probe::Port;
 use crate::record::{JoinedLog, Recording, starter};
 use crate::scenario::{ControllerKind, Scenario};
@@ -57,7 +56,7 @@ pub fn run(
     while !over(mode) && f64::from(tick - FIRST) * TICK_S < longest_s(&scenario.rig) {
         let codes = read(&mut sensors, &plant);
         let command = if mode == Mode::Idle { start.take() } else { None };
-        given = given_by(codes).with(command);
+        given = Given::from(codes).with(command);
         let taken = line.tick(tick, given)?;
         mode = taken.mode().unwrap_or(mode);
         log.add(plant.truth());
@@ -87,16 +86,6 @@ pub fn run(
     };
     let recording = log.finish(asked.target, (scenario, &plant), arrived, asked.rows, wall_s);
     Ok(Recording { stream: stream.unwrap_or_default(), ..recording })
-}
-
-const fn given_by(codes: Codes) -> Given {
-    Given::codes(
-        codes.wheel_encoder,
-        codes.preload_sensor,
-        codes.compression_sensor,
-        codes.arm_angle,
-        codes.bridges,
-    )
 }
 
 /// Reads the board's logs: the binary one, whose bytes are kept if there is a place for them, and

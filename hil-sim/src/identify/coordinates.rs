@@ -74,7 +74,7 @@ impl Coordinates {
     /// tolerances of sensors and wheel are those of its `spread`.
     pub fn of(scenario: &Scenario) -> Self {
         let mut exact = scenario.clone();
-        exact.spread = Spread::none();
+        exact.spread = Spread::default();
         exact.run.seed = 0;
         let nominal = exact.plant();
         let steps = nominal.wall.steps().len();
@@ -216,7 +216,7 @@ mod tests {
         assert_eq!(coordinates.priors()[LOAD_GAIN].deviation, 0.02);
         assert!(coordinates.priors()[LOAD_GAIN].tolerance);
         assert!(!coordinates.priors()[STIFFNESS].tolerance);
-        scenario.spread = Spread::none();
+        scenario.spread = Spread::default();
         assert_eq!(Coordinates::of(&scenario).priors()[RADIUS].deviation, EXACT);
     }
 }

@@ -196,7 +196,7 @@ impl Reader {
 mod tests {
     use super::*;
     use crate::record::{write_csv, write_mcap};
-    use crate::session;
+    use crate::session::{self, RunningRig};
     use interstage::supervise::{Command, Mode};
 
     fn record(ticks: &[u32]) -> Result<Record, IdentifyError> {
@@ -250,8 +250,7 @@ mod tests {
         let mut scenario = Scenario::default();
         scenario.run.seed = 3;
         let directory = tempfile::tempdir().unwrap();
-        let options = session::Options { rows: true, ..session::Options::default() };
-        let recording = session::run(&scenario, options).unwrap();
+        let recording = session::run(&scenario, session::Options::ROWS).unwrap();
         let (csv, mcap) = (directory.path().join("log.csv"), directory.path().join("log.mcap"));
         write_csv(&recording, &csv).unwrap();
         write_mcap(&recording, &mcap).unwrap();

@@ -61,7 +61,7 @@ fn a_fault_behind_the_bridge_does_not_show_at_its_output() {
         let drives = injector.drives(asked);
         assert_eq!(drives.preload != asked.preload, seen, "{kind:?}");
         assert!((drives.worked()[1] - 0.5).abs() > 0.1, "{kind:?}");
-        assert_eq!((injector.acts_s(), injector.tells_s()), (Some(0.020), Some(0.020)));
+        assert_eq!((injector.times().acts_s, injector.times().shows_s), (Some(0.020), Some(0.020)));
     }
 }
 
@@ -71,7 +71,7 @@ fn a_fault_below_the_band_of_the_readback_acts_too() {
     let mut drive = |t_s: f64, drive: f64| {
         injector.begin(t_s, &Truth::default());
         let _ = injector.drives(Drives { drive, drive_on: true, ..Drives::default() });
-        (injector.acts_s(), injector.tells_s())
+        (injector.times().acts_s, injector.times().shows_s)
     };
     assert_eq!(drive(0.010, 0.49), (None, None));
     assert_eq!(drive(0.011, 0.45), (Some(0.011), None));

@@ -228,8 +228,7 @@ mod tests {
 
     /// The lines of a terminal of this size at the end of a run.
     fn drawn(scenario: &Scenario, width: u16, height: u16) -> Vec<String> {
-        let options = session::Options { rows: true, ..session::Options::default() };
-        let stream = session::run(scenario, options).unwrap().stream;
+        let stream = session::run(scenario, session::Options::ROWS).unwrap().stream;
         let (mut screen, mut decoder) = (screen(), Decoder::new());
         decoder.read(&stream, &mut |item| screen.see(&item));
         lines(&screen, decoder.counts(), width, height)
@@ -293,8 +292,7 @@ mod tests {
     fn parameters_that_are_not_the_target_s_are_told() {
         let slow = ["drive.cruise_speed_mm_s=20".to_owned()];
         let scenario = Scenario::default().with(&slow).unwrap();
-        let options = session::Options { rows: true, ..session::Options::default() };
-        let stream = session::run(&scenario, options).unwrap().stream;
+        let stream = session::run(&scenario, session::Options::ROWS).unwrap().stream;
         let (mut screen, mut decoder) = (screen(), Decoder::new());
         decoder.read(&stream[..40_000], &mut |item| screen.see(&item));
         let said = |text: &str| screen.lines.iter().filter(|line| line.1.contains(text)).count();

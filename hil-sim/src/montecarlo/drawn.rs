@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use crate::plant::mismatch::Mismatch;
+use crate::plant::section::Section;
 use crate::scenario::{MismatchDraw, Scenario};
 
 /// A key that differs from run to run, or by which the runs differ from the rig that the
@@ -47,7 +48,6 @@ pub(super) fn mismatch(scenario: &Scenario, seeds: &[u64]) -> Vec<Drawn> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::plant::mismatch::FIELDS;
 
     #[test]
     fn what_is_drawn_or_stated_is_listed() {
@@ -59,7 +59,7 @@ mod tests {
         assert_eq!((stated[0].least, stated[0].most), (0.2, 0.2));
         scenario.run.mismatch = MismatchDraw::Wide;
         let wide = mismatch(&scenario, &[1, 2]);
-        let drawn = FIELDS.iter().filter(|field| field.is_drawn()).count();
+        let drawn = Mismatch::FIELDS.iter().filter(|field| field.wide.is_some()).count();
         assert_eq!(wide.len(), drawn);
         assert!(wide[0].key == "mismatch.friction" && wide[0].least < wide[0].most);
     }

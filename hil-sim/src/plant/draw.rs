@@ -157,7 +157,7 @@ impl PlantParameters {
         noise: &Noise,
         seed: u64,
     ) -> Self {
-        let nominal = Spread::none();
+        let nominal = Spread::default();
         let spread = if seed == 0 { &nominal } else { spread };
         let mut draw = Draw(ChaCha8Rng::seed_from_u64(seed));
         let k_inf = rig.tread.k_inf_pa_per_m * 1e-9 * draw.factor(spread.k_inf_rel);

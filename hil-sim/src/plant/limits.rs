@@ -160,7 +160,7 @@ mod tests {
 
     fn of(rig: &Rig) -> PlantParameters {
         let steps: Vec<_> = rig.rig.step_positions_mm.iter().map(|at| (*at, 0.0)).collect();
-        PlantParameters::draw(rig, &steps, &Spread::none(), &Noise::none(), 0)
+        PlantParameters::draw(rig, &steps, &Spread::default(), &Noise::default(), 0)
     }
 
     fn nominal() -> PlantParameters {

@@ -4,7 +4,6 @@ mod booking;
 mod contact;
 mod error;
 mod intervention;
-mod phases;
 mod traction;
 mod truth;
 mod vibration;
@@ -16,14 +15,13 @@ use super::draw::PlantParameters;
 use super::energy::Energy;
 use super::ledger::Ledger;
 use super::play::{Pivot, Play};
-use super::ring::Ring;
+use super::ring::{Ring, Work};
 use super::rolling::{self, Steady};
 use super::wind_up::WindUp;
 use contact::SettleTimer;
 use traction::Stride;
 
 pub use error::PlantError;
-pub use phases::{PHASES, Phase, PhaseWork};
 pub use truth::Truth;
 
 /// How much farther the screw retreats than each step is high, mm.
@@ -114,9 +112,6 @@ pub struct VirtualRig {
     rolled_mm_s: f64,
     /// Base of the wall under the centre in the last stride, mm.
     base_mm: f64,
-    /// What was computed in each phase.
-    phases: [PhaseWork; PHASES.len()],
-    phase: Phase,
     /// Contact forces of the last stride: normal, cosine and sine sums, N.
     forces: (f64, f64, f64),
     /// Travel by the speeds of the last stride beyond the predicted one: of the carriage and
@@ -208,8 +203,6 @@ impl VirtualRig {
             latched: true,
             rolled_mm_s: 0.0,
             base_mm: local.base_mm,
-            phases: Default::default(),
-            phase: Phase::Smooth,
             forces,
             distance_residual_mm: (0.0, 0.0),
             tread_load_n: 0.0,
@@ -265,6 +258,12 @@ impl VirtualRig {
         &self.ledger
     }
 
+    /// What has been computed so far: on the ring; and of steady rolling the contacts node by
+    /// node, and the heights tried on a tangent.
+    pub fn work(&self) -> (Work, (u64, u64)) {
+        (self.ring.work(), self.steady.work())
+    }
+
     /// Parameters of this plant.
     pub fn parameters(&self) -> &PlantParameters {
         &self.parameters
@@ -291,7 +290,6 @@ impl VirtualRig {
             self.check()?;
             left_s -= part_s;
         }
-        self.count(dt_s);
         self.vibrate(dt_s);
         self.truth.time_s += dt_s;
         // The self-locking screw stops at once; the wheel turns on for some milliseconds.

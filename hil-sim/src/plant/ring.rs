@@ -44,14 +44,6 @@ pub struct Work {
     pub elements: u64,
 }
 
-impl std::ops::AddAssign for Work {
-    fn add_assign(&mut self, other: Self) {
-        self.strides += other.strides;
-        self.iterations += other.iterations;
-        self.elements += other.elements;
-    }
-}
-
 /// The ring's elements and how far the wheel has turned.
 #[derive(Clone, Debug)]
 pub struct Ring {
@@ -151,9 +143,9 @@ impl Ring {
         &self.parameters
     }
 
-    /// What has been computed since the last call.
-    pub(super) fn take_work(&mut self) -> Work {
-        std::mem::take(&mut self.work)
+    /// What has been computed so far.
+    pub(super) const fn work(&self) -> Work {
+        self.work
     }
 
     /// Contact after `motion`, leaving the elements as they are.

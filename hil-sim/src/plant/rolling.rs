@@ -224,9 +224,9 @@ impl Steady {
         solved
     }
 
-    /// Contacts computed node by node and heights tried by tangents since the last call.
-    pub(super) fn take_work(&mut self) -> (u64, u64) {
-        (std::mem::take(&mut self.computed), std::mem::take(&mut self.iterations))
+    /// Contacts computed node by node and heights tried by tangents so far.
+    pub(super) const fn work(&self) -> (u64, u64) {
+        (self.computed, self.iterations)
     }
 }
 

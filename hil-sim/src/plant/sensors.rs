@@ -3,6 +3,7 @@
 
 use std::collections::VecDeque;
 
+use interstage::hal::hil::Given;
 use interstage::sense::raw::{AdcCode, AngleFrame, BridgeCode, BridgeCodes, EncoderCount};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -39,6 +40,13 @@ pub struct Codes {
     pub arm_angle: AngleFrame,
     /// Outputs of the bridges.
     pub bridges: BridgeCodes,
+}
+
+impl From<Codes> for Given {
+    fn from(codes: Codes) -> Self {
+        let Codes { wheel_encoder, preload_sensor, compression_sensor, arm_angle, bridges } = codes;
+        Self::codes(wheel_encoder, preload_sensor, compression_sensor, arm_angle, bridges)
+    }
 }
 
 /// Sensors with their noise.

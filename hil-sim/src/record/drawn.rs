@@ -3,6 +3,7 @@
 use serde_json::{Map, Value, json};
 
 use crate::plant::draw::PlantParameters;
+use crate::plant::section::Section;
 use crate::scenario::{MismatchDraw, Scenario};
 
 /// The value that the plant has of each key that its seed draws; of `mismatch.*` where that is

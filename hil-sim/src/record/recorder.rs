@@ -1,30 +1,62 @@
-//! Records a run as it goes on.
+//! Records a run on any target as it goes on: its sums, what the controller reported, and its rows.
 
 use interstage::model::LimitedBy;
+use interstage::restart::Restart;
 use interstage::supervise::{Mode, ServiceDuties};
 use interstage::tick::{CrossingRecord, Entry, Event, Telemetry};
 use interstage::units::{Direction, Duty, Q16};
 use sha2::{Digest, Sha256};
 
-use super::tally::{Ended, Tally, true_line};
+use super::tick::MOVES;
+use super::time_lost::TimeSplit;
 use super::{
-    Controller, CrossingLine, LogLine, Recording, Report, Tick, mode_number, mode_words, stage_name,
+    Controller, CrossingLine, LogLine, Recording, Report, Summary, Tick, drawn, mode_number,
+    mode_words, stage_name,
 };
 use crate::plant::ledger::Crossing;
 use crate::plant::rig::{Truth, VirtualRig};
 use crate::scenario::Scenario;
+use crate::session::{TICK_S, longest_s};
+
+/// Largest distance from the end of travel after arrival, mm: twice the effect of creep and
+/// wheel radius on the drawn rigs.
+const ARRIVED_WITHIN_MM: f64 = 1.0;
 
 /// The record of a run that goes on.
+#[derive(Default)]
 pub struct RunRecorder {
-    tally: Tally,
+    /// Digest of the controller's outputs.
+    digest: Sha256,
+    /// One row a tick, if they are kept.
+    rows: Vec<Tick>,
+    log: Vec<LogLine>,
+    faults: Vec<Report>,
+    limits: Vec<Report>,
     /// Crossings as the controller reported them, and when, s.
     reported: Vec<(f64, CrossingRecord)>,
+    gap_ref_mm: f64,
+    start_mm: f64,
+    commanded: Option<f64>,
+    run_started: Option<f64>,
+    run_ended: f64,
+    preload_sum: f64,
+    moving: u32,
+    worst_separation: f64,
+    split: TimeSplit,
+    /// What restarted the controller after the command.
+    restart: Option<String>,
+    passed: u32,
 }
 
 impl RunRecorder {
     /// A run from `start_mm` with this reference gap, mm.
-    pub fn new(gap_ref: f64, start_mm: f64) -> Self {
-        Self { tally: Tally::new(gap_ref, start_mm), reported: Vec::new() }
+    pub fn new(gap_ref_mm: f64, start_mm: f64) -> Self {
+        Self { gap_ref_mm, start_mm, ..Self::default() }
+    }
+
+    /// Time at which this tick began, s.
+    fn time_s(&self) -> f64 {
+        f64::from(self.passed) * TICK_S
     }
 
     /// Takes a tick: the controller's state and events, the plant's `truth` before it, and the
@@ -36,27 +68,51 @@ impl RunRecorder {
         truth: &Truth,
         columns: Option<Controller>,
     ) {
-        let Self { tally, reported: crossings } = self;
-        let t_s = tally.time_s();
-        digest(&mut tally.digest, telemetry);
+        let t_s = self.time_s();
+        digest(&mut self.digest, telemetry);
         for Entry { event, .. } in events {
-            tally.log.push(LogLine { t_s, text: text(event) });
+            self.log.push(LogLine { t_s, text: text(event) });
             match reported(t_s, event) {
-                Some((true, fault)) => tally.faults.push(fault),
-                Some((false, limit)) => tally.limits.push(limit),
+                Some((true, fault)) => self.faults.push(fault),
+                Some((false, limit)) => self.limits.push(limit),
                 None => {}
             }
             match event {
-                Event::Crossing(record) => crossings.push((t_s, *record)),
-                Event::Restart(restart) => tally.restart(*restart),
-                Event::Mode(Mode::Preload(_)) => tally.accept_command(),
+                Event::Crossing(record) => self.reported.push((t_s, *record)),
+                // Under way, it ends the run.
+                Event::Restart(restart) if self.commanded.is_some() => {
+                    self.restart = Some(restart_words(*restart));
+                }
+                Event::Mode(Mode::Preload(_)) => self.accept_command(),
                 _ => {}
             }
         }
         if let Some(controller) = columns {
-            tally.rows.push(Tick { controller, truth: Some(truth.into()) });
+            self.rows.push(Tick { controller, truth: Some(truth.into()) });
         }
-        tally.close_tick(mode_number(telemetry.mode), truth);
+        self.close_tick(mode_number(telemetry.mode), truth);
+    }
+
+    /// A command was accepted in this tick: from it on the duration counts, unless the drive
+    /// already moved.
+    fn accept_command(&mut self) {
+        if self.run_started.is_none() {
+            self.commanded = Some(self.time_s());
+        }
+    }
+
+    /// Ends a tick in the mode of this number.
+    fn close_tick(&mut self, mode: u8, truth: &Truth) {
+        let t_s = self.time_s();
+        self.split.add(t_s, mode, truth.position_mm);
+        if MOVES.contains(&mode) {
+            self.run_started.get_or_insert(t_s);
+            self.run_ended = t_s;
+            self.preload_sum += truth.preload_n;
+            self.moving += 1;
+            self.worst_separation = self.worst_separation.max(truth.separation_mm);
+        }
+        self.passed += 1;
     }
 
     /// The record of a run on `target` that took `wall_s` to compute. `arrived` is the
@@ -69,9 +125,62 @@ impl RunRecorder {
         arrived: Option<Direction>,
         wall_s: f64,
     ) -> Recording {
-        let Self { tally, reported } = self;
-        let ended = Ended { target, scenario, plant, arrived, wall_s };
-        tally.finish(&ended, |crossing| crossing_line(crossing, &reported))
+        let truth = plant.truth();
+        let steps = plant.parameters().wall.steps().len();
+        let there = arrived.is_some_and(|direction| {
+            let end_mm = match direction {
+                Direction::Deploy => scenario.rig.rig.travel_mm,
+                Direction::Retract => 0.0,
+            };
+            (truth.position_mm - end_mm).abs() <= ARRIVED_WITHIN_MM
+        });
+        let crossings: Vec<CrossingLine> =
+            plant.ledger().crossings().iter().map(|c| crossing_line(c, &self.reported)).collect();
+        let worst = crossings.iter().map(|c| c.gap_mm).fold(self.worst_separation, f64::max);
+        let completed = there && crossings.len() == steps && self.faults.is_empty();
+        let cruise_mm_s = scenario.rig.drive.cruise_speed_mm_s;
+        let has_gap = !crossings.is_empty() || worst > 0.0;
+        let total_s = self.time_s();
+        let summary = Summary {
+            completed,
+            target: target.into(),
+            controller: scenario.run.controller.name().into(),
+            direction: scenario.run.direction.name().into(),
+            rig: scenario.preset.clone(),
+            seed: scenario.run.seed,
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            overrides: scenario.overrides(),
+            drawn: drawn::of(plant.parameters(), scenario),
+            measured: false,
+            missing: Vec::new(),
+            commanded_s: self.run_started.and(self.commanded),
+            duration_s: self.run_started.and(self.commanded).map(|from| self.run_ended - from),
+            moving_s: self.run_started.map_or(0.0, |from| self.run_ended - from),
+            lost: completed.then(|| self.split.lost(cruise_mm_s)),
+            total_s,
+            cut_off_s: Some(longest_s(&scenario.rig)).filter(|longest_s| total_s >= *longest_s),
+            travel_mm: (truth.position_mm - self.start_mm).abs(),
+            gap_ref_mm: self.gap_ref_mm,
+            max_gap_mm: if has_gap { worst } else { f64::NAN },
+            slip_mm: truth.slip_mm,
+            mean_preload_n: self.preload_sum / f64::from(self.moving.max(1)),
+            energy_j: truth.work_mj * 1e-3,
+            wear_j: truth.wear_mj * 1e-3,
+            faults: self.faults,
+            limits: self.limits,
+            injected: scenario.run.faults.iter().map(ToString::to_string).collect(),
+            real_time_factor: total_s / wall_s.max(1e-9),
+            trace_digest: self.digest.finalize().iter().map(|b| format!("{b:02x}")).collect(),
+            restart: self.restart,
+            crossings,
+        };
+        Recording {
+            summary,
+            rows: self.rows,
+            log: self.log,
+            parameters: scenario.to_toml(),
+            stream: Vec::new(),
+        }
     }
 }
 
@@ -86,14 +195,24 @@ fn crossing_line(crossing: &Crossing, reported: &[(f64, CrossingRecord)]) -> Cro
     let reported = reported.iter().find(same);
     let num = |f: fn(&CrossingRecord) -> Q16| reported.map(|(_, r)| f(r).to_num::<f64>());
     CrossingLine {
+        index: crossing.index as u8,
+        speed_mm_s: crossing.speed_mm_s,
+        preload_n: crossing.preload_n,
+        gap_mm: crossing.gap_mm,
         gap_predicted_mm: num(|r| r.gap_predicted),
         gap_measured_mm: num(|r| r.gap_measured),
+        corner_force_n: crossing.corner_n,
+        lead_time_s: num(|r| r.lead_time),
+        slip_mm: crossing.slip_mm,
         slip_measured_mm: num(|r| r.slip),
         height_measured_mm: num(|r| r.height),
-        lead_time_s: num(|r| r.lead_time),
+        touch_s: crossing.touch_s,
+        lift_s: crossing.lift_s,
+        step_mm: crossing.step_mm,
         step_found_mm: num(|r| r.position),
+        peak_preload_n: crossing.peak_preload_n,
+        peak_utilisation: crossing.peak_utilisation,
         limited_by: reported.and_then(|(_, r)| r.limited_by),
-        ..true_line(crossing)
     }
 }
 
@@ -156,5 +275,84 @@ pub fn text(event: &Event) -> String {
             c.stiffness_scale.to_num::<f64>(),
             c.limited_by.map_or("no plan", LimitedBy::words),
         ),
+    }
+}
+
+/// What restarted the target, and what it did before.
+pub(super) fn restart_words(restart: Restart) -> String {
+    restart.to_string().replacen("started: ", "", 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn truth(preload_n: f64, separation_mm: f64) -> Truth {
+        let scenario = Scenario::resolve(Some("prototype"), None, &[]).expect("a scenario");
+        let plant = VirtualRig::new(scenario.plant(), 0.0, 0.0, TICK_S);
+        Truth { preload_n, separation_mm, ..*plant.truth() }
+    }
+
+    #[test]
+    fn only_ticks_under_way_count() {
+        let mut recorder = RunRecorder::new(2.5, 0.0);
+        for (moves, preload, separation) in
+            [(false, 90.0, 9.0), (true, 30.0, 0.1), (true, 40.0, 0.3), (false, 90.0, 9.0)]
+        {
+            recorder.close_tick(if moves { 5 } else { 3 }, &truth(preload, separation));
+        }
+        assert_eq!((recorder.run_started, recorder.run_ended), (Some(1e-3), 2e-3));
+        assert_eq!((recorder.preload_sum, recorder.moving), (70.0, 2));
+        assert_eq!((recorder.worst_separation, recorder.time_s()), (0.3, 4e-3));
+    }
+
+    #[test]
+    fn the_duration_counts_from_the_last_command_before_the_motion() {
+        let durations = |moves: bool, commands: &[usize]| {
+            let scenario = Scenario::default();
+            let plant = VirtualRig::new(scenario.plant(), 0.0, 0.0, TICK_S);
+            let mut recorder = RunRecorder::new(2.5, 0.0);
+            for tick in 0..10 {
+                if commands.contains(&tick) {
+                    recorder.accept_command();
+                }
+                let under_way = moves && (5..9).contains(&tick);
+                recorder.close_tick(if under_way { 5 } else { 3 }, plant.truth());
+            }
+            let summary = recorder.finish("sil", &scenario, &plant, None, 1.0).summary;
+            (summary.duration_s.map(|s| (1e3 * s).round()), (1e3 * summary.moving_s).round())
+        };
+        assert_eq!(durations(true, &[1, 3, 7]), (Some(5.0), 3.0));
+        // Without a command in the log nothing is claimed, nor without motion.
+        assert_eq!(durations(true, &[]), (None, 3.0));
+        assert_eq!(durations(false, &[1]), (None, 0.0));
+    }
+
+    #[test]
+    fn arriving_takes_the_place_and_every_step() {
+        let scenario = Scenario::resolve(Some("prototype"), None, &[]).expect("a scenario");
+        let end = scenario.rig.rig.travel_mm;
+        let plant = VirtualRig::new(scenario.plant(), end, 33.3, TICK_S);
+        let finish = |arrived| {
+            RunRecorder::new(2.5, 0.0).finish("sil", &scenario, &plant, arrived, 1.0).summary
+        };
+        // It is at the end of travel, but no step has been crossed.
+        assert!(!finish(Some(Direction::Deploy)).completed);
+        assert_eq!(finish(Some(Direction::Deploy)).travel_mm, end);
+        assert!(!finish(None).completed);
+    }
+
+    #[test]
+    fn a_run_that_is_cut_off_says_so() {
+        let scenario = Scenario::default();
+        let plant = VirtualRig::new(scenario.plant(), 0.0, 0.0, TICK_S);
+        let cut_off = |passed| {
+            let recorder = RunRecorder { passed, ..RunRecorder::new(2.5, 0.0) };
+            recorder.finish("sil", &scenario, &plant, None, 1.0).summary
+        };
+        assert_eq!(cut_off(119_999).cut_off_s, None);
+        assert_eq!(cut_off(120_000).cut_off_s, Some(120.0));
+        let said = crate::report::verdict::headline(&cut_off(120_000));
+        assert!(said.starts_with("Did not complete within 120 s: "), "{said}");
     }
 }

@@ -15,8 +15,7 @@ use mcap::records::Record;
 use serde_json::Value;
 
 use super::read::{MCAP, ReadError, content, is_table, parameters, records};
-use super::recorder::{reported, text};
-use super::tally::restart_words;
+use super::recorder::{reported, restart_words, text};
 use super::time_lost::{TimeLost, TimeSplit};
 use super::{Controller, CrossingLine, LedgerLine, LogLine, Recording, Run, Summary, Tick};
 use crate::scenario::Scenario;
@@ -241,8 +240,7 @@ mod tests {
     use crate::session;
 
     fn run() -> Recording {
-        let options = session::Options { rows: true, ..session::Options::default() };
-        session::run(&Scenario::default(), options).unwrap()
+        session::run(&Scenario::default(), session::Options::ROWS).unwrap()
     }
 
     #[test]

@@ -6,19 +6,16 @@ use std::io::Read;
 use interstage::supervise::{Command, Mode};
 
 use crate::scenario::{Direction, Scenario};
-use crate::session::{self, Session};
+use crate::session::{self, RunningRig, Session};
 
 #[derive(Debug, thiserror::Error)]
 pub enum SourceError {
     /// The bytes of the input of this name cannot be read.
     #[error("{0}: {1}")]
     Read(String, std::io::Error),
-    /// The run in software failed.
+    /// The run failed.
     #[error(transparent)]
-    Run(#[from] session::RunError),
-    /// A source of another crate failed.
-    #[error(transparent)]
-    Other(Box<dyn std::error::Error + Send + Sync>),
+    Run(Box<dyn std::error::Error + Send + Sync>),
     #[error(transparent)]
     Port(#[from] crate::probe::PortError),
 }
@@ -86,12 +83,16 @@ impl Source for Bytes {
     }
 }
 
-/// Ticks that the controller on this host runs per call.
+/// Milliseconds that a virtual rig runs per call.
 const TICKS: u32 = 20;
 
-/// The controller on this host, in closed loop with the plant.
-pub struct Virtual {
-    session: Option<Session>,
+/// Milliseconds for which a run without an operator goes on after its end.
+const AFTER: u32 = 100;
+
+/// A virtual rig: the controller on this host or on the emulated board, in closed loop with the
+/// plant.
+pub struct Virtual<R> {
+    rig: R,
     letters: VecDeque<u8>,
     /// Command as soon as the drive is idle; none if an operator commands.
     start: Option<Command>,
@@ -102,47 +103,54 @@ pub struct Virtual {
     left: u32,
 }
 
-impl Virtual {
-    /// A session of this scenario. Unless an operator attends it, it starts by itself and
-    /// ends when the drive has arrived.
+impl Virtual<Session> {
+    /// A session of this scenario.
     pub fn new(scenario: &Scenario, attended: bool) -> Result<Self, session::RunError> {
         let session = Session::new(scenario, session::Options::default())?;
-        Ok(Self {
-            session: Some(session.logging()),
+        Ok(Self::of(session.logging(), scenario, attended))
+    }
+}
+
+impl<R: RunningRig> Virtual<R> {
+    /// A rig of this scenario. Unless an operator attends it, it starts by itself and ends when
+    /// the drive has arrived.
+    pub fn of(rig: R, scenario: &Scenario, attended: bool) -> Self {
+        Self {
+            rig,
             letters: VecDeque::new(),
             start: (!attended).then(|| starter(scenario.run.direction)),
             attended,
             longest_s: session::longest_s(&scenario.rig),
-            left: 100,
-        })
+            left: AFTER,
+        }
     }
 
-    fn tick(&mut self) -> Result<bool, SourceError> {
-        let Some(session) = &mut self.session else { return Ok(false) };
-        let over = matches!(session.mode(), Mode::Complete(_) | Mode::FaultHold(_));
-        if !self.attended && (over || session.time_s() >= self.longest_s) {
+    /// Runs a millisecond; false if the run is over.
+    fn tick(&mut self) -> Result<bool, R::Error> {
+        let over = matches!(self.rig.mode(), Mode::Complete(_) | Mode::FaultHold(_));
+        if !self.attended && (over || self.rig.time_s() >= self.longest_s) {
             self.left = self.left.saturating_sub(1);
-            if self.left == 0 {
-                return Ok(false);
-            }
+        }
+        if self.left == 0 {
+            return Ok(false);
         }
         let typed = self.letters.pop_front().and_then(command);
-        let idle = session.mode() == Mode::Idle;
+        let idle = self.rig.mode() == Mode::Idle;
         let command = typed.or_else(|| if idle { self.start.take() } else { None });
-        session.step(command)?;
+        self.rig.step(command)?;
         Ok(true)
     }
 }
 
-impl Source for Virtual {
+impl<R: RunningRig<Error: std::error::Error + Send + Sync + 'static>> Source for Virtual<R> {
     fn read(&mut self) -> Result<Option<Vec<u8>>, SourceError> {
         for _ in 0..TICKS {
-            if !self.tick()? {
-                let rest = self.session.take().map(|session| session.finish(1.0).stream);
-                return Ok(rest);
+            if !self.tick().map_err(|error| SourceError::Run(Box::new(error)))? {
+                let rest = self.rig.take_log(true);
+                return Ok((!rest.is_empty()).then_some(rest));
             }
         }
-        Ok(self.session.as_mut().map(Session::take_stream))
+        Ok(Some(self.rig.take_log(false)))
     }
 
     fn send(&mut self, letter: u8) -> Result<(), SourceError> {
@@ -174,7 +182,7 @@ mod tests {
     fn rows_that_nobody_reads_are_not_kept() {
         let mut source = Virtual::new(&Scenario::default(), true).unwrap();
         (0..100).for_each(|_| assert!(!source.read().unwrap().unwrap().is_empty()));
-        assert!(source.session.unwrap().finish(1.0).rows.is_empty());
+        assert!(source.rig.finish(1.0).rows.is_empty());
     }
 
     #[test]

@@ -116,8 +116,7 @@ mod tests {
 
     #[test]
     fn the_state_shows_what_came_last() {
-        let options = session::Options { rows: true, ..session::Options::default() };
-        let stream = session::run(&Scenario::default(), options).unwrap().stream;
+        let stream = session::run(&Scenario::default(), session::Options::ROWS).unwrap().stream;
         let (mut view, mut decoder) = (View::default(), Decoder::new());
         decoder.read(&stream, &mut |item| view.see(&item));
         let text = view.text(decoder.counts());

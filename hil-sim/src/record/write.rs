@@ -283,8 +283,7 @@ mod tests {
     }
 
     fn stream() -> Vec<u8> {
-        let options = session::Options { rows: true, ..session::Options::default() };
-        session::run(&Scenario::default(), options).unwrap().stream
+        session::run(&Scenario::default(), session::Options::ROWS).unwrap().stream
     }
 
     fn read(bytes: &[u8]) -> Run {

@@ -6,7 +6,8 @@ use serde::Serialize;
 use toml::{Table, Value};
 
 use super::run::{ControllerKind, Direction, MismatchDraw, RunOptions};
-use crate::plant::mismatch::{FIELDS, Field, Mismatch};
+use crate::plant::mismatch::Mismatch;
+use crate::plant::section::{Field, Section};
 use crate::plant::spread::{Noise, Spread};
 
 /// Names of the presets.
@@ -170,10 +171,10 @@ fn descriptions() -> Vec<(String, String)> {
 
 /// The keys of the mismatch, each with the range of its wide draw.
 fn mismatch() -> Vec<(String, String)> {
-    let described = fields::<Mismatch>("mismatch").into_iter().zip(FIELDS);
-    let with_range = |((key, text), field): ((String, String), &Field)| {
-        let (from, to) = field.wide;
-        (key, if field.is_drawn() { format!("{text} Wide {from} to {to}.") } else { text })
+    let described = fields::<Mismatch>("mismatch").into_iter().zip(Mismatch::FIELDS);
+    let with_range = |((key, text), field): ((String, String), &Field<Mismatch>)| match field.wide {
+        Some((from, to)) => (key, format!("{text} Wide {from} to {to}.")),
+        None => (key, text),
     };
     described.map(with_range).collect()
 }

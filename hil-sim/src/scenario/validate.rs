@@ -5,6 +5,7 @@ use interstage::rig::{Bound, RigError};
 use super::injection::entry;
 use super::merge::Provenance;
 use super::{Scenario, ScenarioError, StepAnomaly, keys};
+use crate::plant::section::{Field, Section};
 
 /// Largest offset of an early or late step, mm.
 const MAX_OFFSET_MM: f64 = 20.0;
@@ -16,12 +17,8 @@ const MAX_HIGHER_MM: f64 = 4.0;
 pub(super) fn check(scenario: &Scenario, from: &Provenance) -> Result<(), ScenarioError> {
     let refused = |message: String| ScenarioError::at(from.of_message(&message), &message);
     scenario.rig.validate().map_err(|error| of_rig(&error, scenario, from))?;
-    for (key, value, max) in ranges(scenario) {
-        in_range(from.of(key), key, value, (0.0, max))?;
-    }
-    for (field, value) in scenario.mismatch.values() {
-        let key = format!("mismatch.{}", field.name);
-        in_range(from.of(&key), &key, value, field.range)?;
+    for (key, value, range) in plant_keys(scenario) {
+        in_range(from.of(&key), &key, value, range)?;
     }
     anomalies(scenario, from.of("run.anomalies"))?;
     spacing(scenario, from.of("run.anomalies"))?;
@@ -77,47 +74,27 @@ fn in_range(
 /// Every key that is a number with its least and largest value.
 pub(super) fn all_ranges(scenario: &Scenario) -> Vec<(String, (f64, f64))> {
     let rig = scenario.rig.bounds().map(|(key, _, min, max)| (key.to_owned(), (min, max)));
-    let plant = ranges(scenario).map(|(key, _, max)| (key.to_owned(), (0.0, max)));
-    let mismatch = scenario.mismatch.values();
-    let mismatch = mismatch.map(|(field, _)| (format!("mismatch.{}", field.name), field.range));
-    rig.into_iter().chain(plant).chain(mismatch).collect()
+    let plant = plant_keys(scenario).into_iter().map(|(key, _, range)| (key, range));
+    rig.into_iter().chain(plant).collect()
 }
 
-/// Keys with their value and largest value; the least is 0.
-fn ranges(scenario: &Scenario) -> [(&'static str, f64, f64); 29] {
-    let (s, n) = (&scenario.spread, &scenario.noise);
+/// Keys of the plant with their value, least and largest value.
+fn plant_keys(scenario: &Scenario) -> Vec<(String, f64, (f64, f64))> {
+    fn section<T: Section>(name: &str, keys: &T) -> Vec<(String, f64, (f64, f64))> {
+        let key = |(field, value): (&Field<T>, f64)| {
+            (format!("{name}.{}", field.name), value, field.range)
+        };
+        keys.values().map(key).collect()
+    }
+    // TOML has no larger integer.
+    let seed = ("run.seed".to_owned(), scenario.run.seed as f64, (0.0, i64::MAX as f64));
     [
-        ("spread.k_inf_rel", s.k_inf_rel, 0.3),
-        ("spread.stiffening_rel", s.stiffening_rel, 0.3),
-        ("spread.tau_rel", s.tau_rel, 0.3),
-        ("spread.mu_rel", s.mu_rel, 0.3),
-        ("spread.top_load_rel", s.top_load_rel, 0.3),
-        ("spread.step_position_mm", s.step_position_mm, 5.0),
-        ("spread.step_height_mm", s.step_height_mm, 0.5),
-        ("spread.wheel_radius_mm", s.wheel_radius_mm, 1.0),
-        ("spread.wear_mm", s.wear_mm, 2.0),
-        ("spread.spring_rel", s.spring_rel, 0.3),
-        ("spread.delay_rel", s.delay_rel, 0.3),
-        ("spread.lag_rel", s.lag_rel, 0.3),
-        ("spread.slew_rel", s.slew_rel, 0.3),
-        ("spread.preload_sensor_gain_rel", s.preload_sensor_gain_rel, 0.1),
-        ("spread.compression_sensor_gain_rel", s.compression_sensor_gain_rel, 0.1),
-        ("spread.arm_angle_zero_deg", s.arm_angle_zero_deg, 2.0),
-        ("spread.supply_rel", s.supply_rel, 0.1),
-        ("spread.readback_gain_rel", s.readback_gain_rel, 0.1),
-        ("spread.readback_zero_duty", s.readback_zero_duty, 0.1),
-        ("spread.readback_lag_rel", s.readback_lag_rel, 0.3),
-        ("noise.preload_sensor_n", n.preload_sensor_n, 10.0),
-        ("noise.compression_sensor_mm", n.compression_sensor_mm, 0.5),
-        ("noise.arm_angle_lsb", n.arm_angle_lsb, 50.0),
-        ("noise.wheel_encoder_jitter_counts", n.wheel_encoder_jitter_counts, 10.0),
-        ("noise.preload_sensor_delay_s", n.preload_sensor_delay_s, 0.02),
-        ("noise.compression_sensor_delay_s", n.compression_sensor_delay_s, 0.02),
-        ("noise.arm_angle_delay_s", n.arm_angle_delay_s, 0.02),
-        ("noise.readback_duty", n.readback_duty, 0.1),
-        // TOML has no larger integer.
-        ("run.seed", scenario.run.seed as f64, i64::MAX as f64),
+        section("spread", &scenario.spread),
+        section("noise", &scenario.noise),
+        vec![seed],
+        section("mismatch", &scenario.mismatch),
     ]
+    .concat()
 }
 
 fn anomalies(scenario: &Scenario, origin: &str) -> Result<(), ScenarioError> {

@@ -10,8 +10,8 @@ use interstage::tick::{Controller, Input, Output, State};
 use interstage::units::{Millimetres, MotorCommand, Tick};
 
 use super::stream::Stream;
-use super::{Options, RunError, TICK_S};
-use crate::injector::{FaultInjector, RecordFound};
+use super::{Options, RunError, RunningRig, TICK_S};
+use crate::injector::{FaultInjector, FaultTimes, RecordFound};
 use crate::plant::limits::Refusal;
 use crate::plant::rig::{Drives, VirtualRig};
 use crate::plant::sensors::{Codes, Sensed, Sensors};
@@ -23,7 +23,7 @@ const ANGLE_EVERY: Tick = 2;
 
 /// A run in progress.
 ///
-/// [`Session::step`] is one millisecond. Its two halves, [`Session::sense`] and
+/// [`RunningRig::step`] is one millisecond. Its two halves, [`Session::sense`] and
 /// [`Session::advance`], let a caller change what the controller is given.
 pub struct Session {
     scenario: Scenario,
@@ -106,12 +106,6 @@ impl Session {
         self
     }
 
-    /// One millisecond with an operator's command or none.
-    pub fn step(&mut self, command: Option<Command>) -> Result<Output, RunError> {
-        let frame = self.sense();
-        self.advance(&frame, command)
-    }
-
     /// Reads the sensors: the latest code of each at the present tick. Once a tick,
     /// before [`Session::advance`]. Here the scenario's faults come and go.
     pub fn sense(&mut self) -> SensorFrame {
@@ -190,22 +184,6 @@ impl Session {
         rows.then(|| Columns::of(&Record::of(&input, output), sensors))
     }
 
-    /// When a fault first acted, see [`FaultInjector::acts_s`], s since boot.
-    pub fn acts_s(&self) -> Option<f64> {
-        self.injector.as_ref().and_then(FaultInjector::acts_s)
-    }
-
-    /// When the readback first had to show a fault, see [`FaultInjector::tells_s`], s since
-    /// boot.
-    pub fn tells_s(&self) -> Option<f64> {
-        self.injector.as_ref().and_then(FaultInjector::tells_s)
-    }
-
-    /// When the first of the scenario's faults came, s since boot.
-    pub fn struck_s(&self) -> Option<f64> {
-        self.injector.as_ref().and_then(FaultInjector::struck_s)
-    }
-
     /// A power cycle: the controller forgets everything, the rig stays where it is.
     pub fn reboot(&mut self) {
         self.state = State::default();
@@ -255,34 +233,44 @@ impl Session {
         }
     }
 
-    pub const fn mode(&self) -> Mode {
-        self.state.mode()
-    }
-
-    /// Time since boot, s.
-    pub fn time_s(&self) -> f64 {
-        f64::from(self.tick) * TICK_S
-    }
-
-    pub const fn plant(&self) -> &VirtualRig {
-        &self.plant
-    }
-
-    /// The binary log since the last call; empty if it is not kept.
-    pub fn take_stream(&mut self) -> Vec<u8> {
-        self.stream.as_mut().map(Stream::take).unwrap_or_default()
-    }
-
     /// The recording of a session that ends here; it took `wall_s` to compute.
-    pub fn finish(self, wall_s: f64) -> Recording {
+    pub fn finish(mut self, wall_s: f64) -> Recording {
+        let stream = self.take_log(true);
         let arrived = match self.state.mode() {
             Mode::Complete(direction) => Some(direction),
             _ => None,
         };
-        let mut recording =
-            self.recorder.finish("sil", &self.scenario, &self.plant, arrived, wall_s);
-        recording.stream = self.stream.map(Stream::finish).unwrap_or_default();
-        recording
+        let recording = self.recorder.finish("sil", &self.scenario, &self.plant, arrived, wall_s);
+        Recording { stream, ..recording }
+    }
+}
+
+impl RunningRig for Session {
+    type Error = RunError;
+
+    fn step(&mut self, command: Option<Command>) -> Result<Output, RunError> {
+        let frame = self.sense();
+        self.advance(&frame, command)
+    }
+
+    fn mode(&self) -> Mode {
+        self.state.mode()
+    }
+
+    fn time_s(&self) -> f64 {
+        f64::from(self.tick) * TICK_S
+    }
+
+    fn plant(&self) -> &VirtualRig {
+        &self.plant
+    }
+
+    fn fault_times(&self) -> FaultTimes {
+        self.injector.as_ref().map(FaultInjector::times).unwrap_or_default()
+    }
+
+    fn take_log(&mut self, end: bool) -> Vec<u8> {
+        self.stream.as_mut().map(|stream| stream.take(end)).unwrap_or_default()
     }
 }
 

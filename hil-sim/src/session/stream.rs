@@ -40,14 +40,17 @@ impl Stream {
         self.encoder.tick(&Record::of(input, output), &mut send);
     }
 
-    /// The bytes since the last call.
-    pub fn take(&mut self) -> Vec<u8> {
+    /// The bytes since the last call, at the log's `end` with what is not sent yet.
+    pub fn take(&mut self, end: bool) -> Vec<u8> {
+        if end {
+            self.encoder.flush(&mut into(&mut self.bytes));
+        }
         std::mem::take(&mut self.bytes)
     }
 
     /// The controller restarts; what it had not sent is lost.
     pub(super) fn restart(&mut self, scenario: &Scenario, controller: &Controller) {
-        let bytes = self.take();
+        let bytes = self.take(false);
         *self = Self { bytes, ..Self::new(scenario, controller) };
     }
 
@@ -55,12 +58,6 @@ impl Stream {
     pub(super) fn report(&mut self, restart: Restart) {
         let entry = Entry { at: 0, event: Event::Restart(restart) };
         self.encoder.entry(&entry, &mut into(&mut self.bytes));
-    }
-
-    /// The rest of the log.
-    pub fn finish(mut self) -> Vec<u8> {
-        self.encoder.flush(&mut into(&mut self.bytes));
-        self.bytes
     }
 }
 

@@ -70,7 +70,7 @@ fn a_run_with_a_fault_of_its_scenario_ends_in_it_and_reports_it() {
     let mut scenario = Scenario::default();
     let stuck = Injection::at(Target::PreloadSensor, Kind::Stuck, 0.0, 0.0);
     scenario.run.faults = vec![Injection { at_s: None, at_mm: Some(10.0), ..stuck }];
-    let recording = run(&scenario, Options { rows: true, speed: None }).expect("a run");
+    let recording = run(&scenario, Options::ROWS).expect("a run");
     let summary = recording.summary;
     assert_eq!(summary.faults.iter().map(|fault| fault.code).collect::<Vec<_>>(), [116]);
     assert!(!summary.completed && (10.0..14.0).contains(&summary.travel_mm), "{summary:?}");
@@ -119,8 +119,7 @@ fn a_log_without_a_reader_does_not_change_the_run() {
     let clean = Scenario::default();
     let mut gone = clean.clone();
     gone.run.faults = vec![Injection::at(Target::Log, Kind::Gone, 1.0, 0.0)];
-    let run =
-        |scenario: &Scenario| run(scenario, Options { rows: true, speed: None }).expect("a run");
+    let run = |scenario: &Scenario| run(scenario, Options::ROWS).expect("a run");
     let (clean, gone) = (run(&clean), run(&gone));
     assert_eq!(clean.summary.trace_digest, gone.summary.trace_digest);
     assert!(gone.stream.len() < clean.stream.len() / 2);

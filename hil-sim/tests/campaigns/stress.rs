@@ -2,7 +2,7 @@
 
 use crate::common::{DIRECTIONS, scenario, starter};
 use hil_sim::scenario::Scenario;
-use hil_sim::session::{Options, Session};
+use hil_sim::session::{Options, RunningRig, Session};
 use hil_sim::stress::{self, Figure};
 use interstage::supervise::{Leg, Mode};
 use interstage::tick::Output;

@@ -12,8 +12,7 @@ use super::{code, good, number, object, refused_in, rig, rig_in, stderr, stdout}
 
 /// The frames of a deployment.
 fn frames() -> Vec<Vec<u8>> {
-    let options = session::Options { rows: true, ..session::Options::default() };
-    let stream = session::run(&Scenario::default(), options).expect("a run").stream;
+    let stream = session::run(&Scenario::default(), session::Options::ROWS).expect("a run").stream;
     hil_sim::record::pieces(&stream).map(<[u8]>::to_vec).collect()
 }
 
@@ -174,8 +173,7 @@ fn a_view_records_what_it_shows() {
 fn a_log_of_other_parameters_than_those_given_has_none_and_says_so() {
     let set = ["--set", "drive.cruise_speed_mm_s=20"];
     let scenario = Scenario::default().with(&[set[1].to_owned()]).expect("a scenario");
-    let options = session::Options { rows: true, ..session::Options::default() };
-    let stream = session::run(&scenario, options).expect("a run").stream;
+    let stream = session::run(&scenario, session::Options::ROWS).expect("a run").stream;
     let (directory, line) = file("line.bin", &stream);
     let at = directory.path();
     let output = rig_in(at, &["capture", "--stream", name(&line), "--out", "without"]);

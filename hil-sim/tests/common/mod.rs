@@ -11,7 +11,7 @@ use hil_sim::plant::ledger::Crossing;
 use hil_sim::plant::rig::Truth;
 pub(crate) use hil_sim::record::starter;
 use hil_sim::scenario::{Direction, Scenario};
-use hil_sim::session::{Options, Session};
+use hil_sim::session::{Options, RunningRig, Session};
 use interstage::fault::Fault;
 use interstage::sense::raw::SensorFrame;
 use interstage::supervise::{Command, Mode};

@@ -9,7 +9,7 @@ use hil_sim::identify::result::identify;
 use hil_sim::plant::draw::PlantParameters;
 use hil_sim::plant::sensors::Sensors;
 use hil_sim::scenario::{ControllerKind, Scenario};
-use hil_sim::session::{Options, Session, drives, read};
+use hil_sim::session::{Options, RunningRig, Session, drives, read};
 use interstage::sense::raw::{Sample, SensorFrame};
 use interstage::supervise::{Command, Mode};
 use rand::{Rng, SeedableRng};

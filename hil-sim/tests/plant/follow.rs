@@ -3,7 +3,7 @@
 
 use hil_sim::plant::rig::{Drives, VirtualRig};
 use hil_sim::scenario::Scenario;
-use hil_sim::session::{Options, Session};
+use hil_sim::session::{Options, RunningRig, Session};
 
 use super::bench::{TICK_S, nominal, steps};
 

@@ -20,8 +20,7 @@ fn with_too_little_friction_a_run_does_not_complete() {
         [("prototype", 0.0), ("prototype", 0.3), ("prototype", 0.6), ("fe", 0.3), ("fe", 0.5)]
     {
         let set = format!("plant.mu={friction}");
-        let options = Options { rows: true, ..Options::default() };
-        let recording = run(&scenario(preset, &[&set]), options).unwrap();
+        let recording = run(&scenario(preset, &[&set]), Options::ROWS).unwrap();
         let summary = &recording.summary;
         assert!(!summary.completed, "{preset} at {friction}");
         let faults: Vec<u16> = summary.faults.iter().map(|fault| fault.code).collect();

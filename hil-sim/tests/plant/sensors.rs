@@ -63,7 +63,7 @@ fn arm_rad(radius_mm: f64) -> f64 {
 
 #[test]
 fn every_quantity_comes_back_within_its_quantisation() {
-    let mut chain = Chain::new(Noise::none());
+    let mut chain = Chain::new(Noise::default());
     let mut offset = [0.0f64; 2];
     for i in 0..4000 {
         let part = f64::from(i) / 4000.0;
@@ -105,7 +105,7 @@ fn a_reading_is_as_old_as_its_delay() {
             preload_sensor_delay_s: delay,
             compression_sensor_delay_s: delay,
             arm_angle_delay_s: delay,
-            ..Noise::none()
+            ..Noise::default()
         };
         let mut chain = Chain::new(noise);
         for i in 0..200 {
@@ -134,7 +134,7 @@ fn noise_has_its_deviation_and_no_bias() {
         preload_sensor_n: 0.05,
         compression_sensor_mm: 0.002,
         arm_angle_lsb: 2.0,
-        ..Noise::none()
+        ..Noise::default()
     };
     let mut chain = Chain::new(noise);
     let (count, radius) = (5000, 120.0);
@@ -168,7 +168,7 @@ fn noise_has_its_deviation_and_no_bias() {
 
 #[test]
 fn codes_stop_at_the_converters_ends() {
-    let mut chain = Chain::new(Noise::none());
+    let mut chain = Chain::new(Noise::default());
     let mut codes = |preload_n| {
         let codes = chain.read(Sensed { preload_n, ..Sensed::default() });
         codes.preload_sensor.get()

@@ -1,6 +1,7 @@
 //! What a seed draws, against the meaning that the scenario's keys document.
 
 use hil_sim::plant::draw::PlantParameters;
+use hil_sim::plant::section::Section;
 use hil_sim::plant::spread::Spread;
 use hil_sim::scenario::Scenario;
 
@@ -34,7 +35,7 @@ fn seed_0_is_the_nominal_rig() {
     assert_eq!((plant.sensors.preload_sensor_gain, plant.sensors.tread_gain), (1.0, 1.0));
     assert_eq!(plant.sensors.angle_zero_rad, 0.0);
     // Without spread every seed is that rig.
-    let mut narrow = Scenario { spread: Spread::none(), ..scenario };
+    let mut narrow = Scenario { spread: Spread::default(), ..scenario };
     narrow.run.seed = 5;
     assert_eq!(narrow.plant(), plant);
 }

@@ -9,7 +9,7 @@ use std::io::{Cursor, Sink};
 
 use hil_sim::record::{Source, Virtual, Writer};
 use hil_sim::scenario::Scenario;
-use hil_sim::session::{Options, Session};
+use hil_sim::session::{Options, RunningRig, Session};
 use interstage::supervise::{Command, Mode};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -108,7 +108,7 @@ fn resets(scenario: &Scenario, file: &mut File<'_>) {
                 break;
             }
         }
-        file.take(&session.take_stream(), &mut |_| {}).expect("written");
+        file.take(&session.take_log(false), &mut |_| {}).expect("written");
         if !last {
             if random.random_ratio(1, FORGETS) { session.reboot() } else { session.restart() }
         }

@@ -12,7 +12,7 @@ use hil_sim::record::write_mcap;
 use hil_sim::record::{Decoder, Item, Mark, Run};
 use hil_sim::replay::replay;
 use hil_sim::scenario::Scenario;
-use hil_sim::session::{Options, Session};
+use hil_sim::session::{Options, RunningRig, Session};
 use hil_sim::testing::long;
 use interstage::log::TICKS_PER_FRAME;
 use interstage::rig::Rig;
@@ -90,7 +90,7 @@ fn an_hour_of_deploying_and_retracting_is_logged_without_a_gap() {
             let truth = session.plant().truth();
             truths.push_back((truth.position_mm, truth.preload_n));
             session.step(command).expect("runs");
-            let bytes = session.take_stream();
+            let bytes = session.take_log(false);
             largest = largest.max(bytes.len());
             decoder.read(&bytes, &mut |item| match item {
                 Item::Tick(record, _) => {
@@ -156,8 +156,7 @@ fn found(file: &Path) -> Value {
 fn python_reads_the_files_by_the_schemas_inside() {
     let directory = tempfile::tempdir().expect("a directory");
     let path = directory.path().join("log.mcap");
-    let options = Options { rows: true, ..Options::default() };
-    let recording = hil_sim::session::run(&Scenario::default(), options).expect("a run");
+    let recording = hil_sim::session::run(&Scenario::default(), Options::ROWS).expect("a run");
     write_mcap(&recording, &path).expect("written");
     let found = found(&path);
     let counts = &found["counts"];

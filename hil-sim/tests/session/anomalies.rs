@@ -30,7 +30,7 @@ impl Outcome {
 }
 
 fn outcome(scenario: &Scenario) -> Outcome {
-    let recording = run(scenario, Options { rows: true, speed: None }).expect("a run");
+    let recording = run(scenario, Options::ROWS).expect("a run");
     let (summary, rows) = (recording.summary, recording.rows);
     let end_mm = rows.last().expect("rows").of_truth(|t| t.position_true_mm);
     let codes = summary.limits.iter().map(|limit| limit.code);

@@ -26,7 +26,7 @@ struct Run {
 impl Run {
     fn new(rig: &str, direction: Direction, seed: u64) -> Self {
         let scenario = scenario(rig, direction, seed);
-        let recording = run(&scenario, Options { rows: true, speed: None }).expect("a run");
+        let recording = run(&scenario, Options::ROWS).expect("a run");
         let name = format!("{rig} {} seed {seed}", direction.name());
         let (summary, rows) = (recording.summary, recording.rows);
         Self { name, scenario, summary, rows, nominal: seed == 0 }

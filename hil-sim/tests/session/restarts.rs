@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::common::{DIRECTIONS, opposite, scenario, starter};
 use hil_sim::scenario::{Direction, Scenario};
-use hil_sim::session::{Options, Session};
+use hil_sim::session::{Options, RunningRig, Session};
 use hil_sim::testing::long;
 use interstage::fault::{Fault, Limit};
 use interstage::restart::{Reset, Restart};

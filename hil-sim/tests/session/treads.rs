@@ -8,7 +8,7 @@ use hil_sim::session::{Options, run};
 fn deployed(sets: &[&str]) -> (Recording, f64) {
     let sets: Vec<String> = sets.iter().map(|set| (*set).to_owned()).collect();
     let scenario = Scenario::resolve(None, None, &sets).expect("a sound scenario");
-    let recording = run(&scenario, Options { rows: true, speed: None }).expect("a run");
+    let recording = run(&scenario, Options::ROWS).expect("a run");
     assert!(recording.summary.completed, "{sets:?}");
     let reference = recording.summary.gap_ref_mm;
     (recording, reference)

@@ -18,6 +18,7 @@ use hil_sim::faults::judge::{Finding, Judge};
 use hil_sim::faults::sets;
 use hil_sim::scenario::Scenario;
 use hil_sim::scenario::injection::{Injection, Onset, Target};
+use hil_sim::session::RunningRig;
 
 /// A start that holds, in the matrix.
 const HELD: &str = "parameters damaged";
@@ -98,7 +99,7 @@ pub(super) fn judged(
         finding = Finding::Found;
     }
     Ok(Instant {
-        at_s: board.bench.fault_times().struck_s,
+        at_s: board.fault_times().struck_s,
         finding,
         code: report.map(|(_, code)| code),
         restart: restart.map(Into::into),
@@ -113,12 +114,12 @@ pub(super) fn judged(
 
 /// Switches power off and on, and watches the board for a while.
 fn power_cycle(board: &mut Board<'_>, judge: &mut Judge) -> Result<(), BoardError> {
-    board.bench.machine_mut().restart(Cause::Power)?;
-    let until_s = board.bench.time_s() + AFTER_S;
-    while board.bench.time_s() < until_s {
-        let t_s = board.bench.time_s();
-        let (output, _) = board.step(None)?;
-        judge.look(t_s, &output, board.bench.plant().truth(), true);
+    board.bench.machine.restart(Cause::Power)?;
+    let until_s = board.time_s() + AFTER_S;
+    while board.time_s() < until_s {
+        let t_s = board.time_s();
+        let output = board.step(None)?;
+        judge.look(t_s, &output, board.plant().truth(), true);
     }
     Ok(())
 }
@@ -146,7 +147,7 @@ fn harm(
         return Ok(Some(format!("runs on the set `{name}`")));
     }
     let mut flash = vec![0; 2 * SLOT_BYTES];
-    board.bench.machine().peek(PARAMETER_SETS, &mut flash)?;
+    board.bench.machine.peek(PARAMETER_SETS, &mut flash)?;
     let set = sets::set(name, &scenario.rig)?;
     let intact = flash.windows(set.len()).any(|bytes| bytes == set);
     Ok((!intact).then(|| format!("runs on the set `{name}`, of which a bit is another")))

@@ -8,13 +8,13 @@ use interstage::tick::Event;
 use interstage::units::Direction;
 
 use super::Board;
-use crate::bench::Passed;
 use crate::chip::map::PARAMETER_SETS;
 use crate::error::BoardError;
 use crate::peripherals::rcc::Cause;
 use hil_sim::plant::rig::Truth;
 use hil_sim::record::Run;
 use hil_sim::scenario::Scenario;
+use hil_sim::session::RunningRig;
 
 /// Most motion from the reset to the command, mm: the wheel coasts when its motor loses power.
 const MOTION_MM: f64 = 0.5;
@@ -41,6 +41,7 @@ const RUN_MS: u32 = 60_000;
 const HOLD_MS: u32 = 150;
 
 /// The plant and the pins around a reset.
+#[derive(Default)]
 pub(super) struct Hold {
     /// Bytes of the stored parameters.
     place: Vec<u8>,
@@ -60,21 +61,13 @@ pub(super) struct Hold {
 impl Hold {
     /// Before the first millisecond, with these stored parameters.
     pub(super) fn new(place: Vec<u8>) -> Self {
-        Self {
-            place,
-            positions_mm: Vec::new(),
-            struck: None,
-            reset: None,
-            last: None,
-            driven: false,
-            commanded: false,
-        }
+        Self { place, ..Self::default() }
     }
 
     /// Looks at a millisecond.
-    pub(super) fn look(&mut self, board: &Board<'_>, passed: &Passed, command: Option<Command>) {
-        let truth = board.bench.plant().truth();
-        if board.bench.fault_times().struck_s.is_some() {
+    pub(super) fn look(&mut self, board: &Board<'_>, command: Option<Command>) {
+        let truth = board.plant().truth();
+        if board.fault_times().struck_s.is_some() {
             self.struck.get_or_insert(*truth);
         }
         if board.restarts == 0 {
@@ -88,7 +81,7 @@ impl Hold {
         // The bridges were driven in the millisecond of the reset.
         if self.last.is_some() {
             self.reset.get_or_insert(*truth);
-            let drives = &passed.drives;
+            let drives = &board.drives;
             self.driven |= drives.drive_on && drives.drive != 0.0;
             self.driven |= drives.preload_on && drives.preload != 0.0;
         }
@@ -160,7 +153,7 @@ impl Hold {
         board: &mut Board<'_>,
         scenario: &Scenario,
     ) -> Result<(Vec<String>, Option<String>), BoardError> {
-        let Some((_, cause)) = board.bench.machine().restarts().first().copied() else {
+        let Some((_, cause)) = board.bench.machine.restarts().first().copied() else {
             return Ok((Vec::new(), Some("no reset".to_owned())));
         };
         let events = Run::of_stream(&board.frames).events;
@@ -175,7 +168,7 @@ impl Hold {
         let mut harms = self.harms(scenario);
         harms.extend(next_run(board, scenario)?);
         let mut stored = vec![0; self.place.len()];
-        board.bench.machine().peek(PARAMETER_SETS, &mut stored)?;
+        board.bench.machine.peek(PARAMETER_SETS, &mut stored)?;
         if stored != self.place {
             harms.push("the stored parameters changed".to_owned());
         }
@@ -207,7 +200,7 @@ fn next_run(board: &mut Board<'_>, scenario: &Scenario) -> Result<Option<String>
                 Direction::Deploy => scenario.rig.rig.travel_mm,
                 Direction::Retract => 0.0,
             };
-            let at_mm = board.bench.plant().truth().position_mm;
+            let at_mm = board.plant().truth().position_mm;
             let far = (at_mm - end_mm).abs() > ARRIVED_MM;
             return Ok(far.then(|| format!("says it arrived at {at_mm:.2} mm")));
         }
@@ -227,6 +220,6 @@ fn next_run(board: &mut Board<'_>, scenario: &Scenario) -> Result<Option<String>
             board.step(None)?;
         }
     }
-    let at_mm = board.bench.plant().truth().position_mm;
+    let at_mm = board.plant().truth().position_mm;
     Ok(Some(format!("did not arrive after the reset: {:?}, {at_mm:.2} mm", board.mode)))
 }

@@ -107,11 +107,11 @@ impl Board {
     }
 
     pub(crate) fn position_mm(&self) -> f64 {
-        self.bench.plant().truth().position_mm
+        self.bench.plant.truth().position_mm
     }
 
     pub(crate) fn machine(&mut self) -> &mut Machine {
-        self.bench.machine_mut()
+        &mut self.bench.machine
     }
 
     pub(crate) fn strike(&mut self, fault: Fault) {
@@ -120,7 +120,7 @@ impl Board {
 
     /// Address of the first function whose name contains this.
     pub(crate) fn function(&self, name: &str) -> u32 {
-        let functions = &self.bench.machine().image().functions;
+        let functions = &self.bench.machine.image().functions;
         let found = functions.iter().find(|function| function.name.contains(name));
         found.unwrap_or_else(|| panic!("no function {name}")).range.start
     }
@@ -132,12 +132,12 @@ impl Board {
     /// Cause and time, ms, of the reset within so many milliseconds, and when the drive was on
     /// before it.
     pub(crate) fn reset(&mut self, milliseconds: u32) -> (Cause, u32, Vec<bool>) {
-        let before = self.bench.machine().restarts().len();
+        let before = self.bench.machine.restarts().len();
         let mut driven = Vec::new();
         for after in 0..milliseconds {
             let drives = self.step().drives;
             driven.push(drives.drive_on && drives.drive != 0.0);
-            if let Some((_, cause)) = self.bench.machine().restarts().get(before) {
+            if let Some((_, cause)) = self.bench.machine.restarts().get(before) {
                 return (*cause, after, driven);
             }
         }

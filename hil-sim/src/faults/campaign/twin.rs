@@ -11,7 +11,7 @@ use rand_chacha::ChaCha8Rng;
 use super::longest_s;
 use super::operator::Operator;
 use crate::scenario::Scenario;
-use crate::session::{Options, RunError, Session};
+use crate::session::RunningRig;
 
 /// A run without fault.
 pub struct Twin {
@@ -29,21 +29,27 @@ pub struct Twin {
 }
 
 impl Twin {
-    /// Runs it in software.
-    pub fn run(scenario: &Scenario) -> Result<Self, RunError> {
-        let mut session = Session::new(scenario, Options::default())?;
-        let mut operator = Operator::default();
-        let mut twin = Self::new(scenario)?;
-        let longest_s = longest_s(&scenario.rig);
-        while session.time_s() < longest_s {
-            let t_s = session.time_s();
-            let command = operator.command(session.mode());
+    /// Runs it, and watches what comes within this time of its end, s.
+    ///
+    /// # Errors
+    /// Those of the rig.
+    pub fn run<R>(mut rig: R, scenario: &Scenario, after_s: f64) -> Result<Self, R::Error>
+    where
+        R: RunningRig<Error: From<RigError>>,
+    {
+        let (mut operator, mut twin) = (Operator::default(), Self::new(scenario)?);
+        let (longest_s, mut over_s) = (longest_s(&scenario.rig), 0.0);
+        while rig.time_s() < longest_s {
+            let t_s = rig.time_s();
+            let command = operator.command(rig.mode());
             if !operator.started() {
                 twin.started_s = t_s;
             }
-            let output = session.step(command)?;
-            twin.note(t_s, session.mode(), &output, false);
-            if operator.over(session.mode()) && command.is_none() {
+            let output = rig.step(command)?;
+            let over = operator.over(rig.mode()) && command.is_none();
+            twin.note(t_s, rig.mode(), &output, over && after_s > 0.0);
+            over_s = if over { over_s + 1e-3 } else { 0.0 };
+            if over && over_s >= after_s {
                 break;
             }
         }
@@ -51,7 +57,7 @@ impl Twin {
     }
 
     /// Before the first tick.
-    pub fn new(scenario: &Scenario) -> Result<Self, RigError> {
+    fn new(scenario: &Scenario) -> Result<Self, RigError> {
         let planner = Planner::try_build(&scenario.rig)?;
         Ok(Self {
             started_s: 0.0,
@@ -64,7 +70,7 @@ impl Twin {
     }
 
     /// A tick, after which the drive is in this mode; `over`: it is behind the end of the run.
-    pub fn note(&mut self, t_s: f64, mode: Mode, output: &Output, over: bool) {
+    fn note(&mut self, t_s: f64, mode: Mode, output: &Output, over: bool) {
         for entry in &output.events {
             if let Event::Limit(limit) = entry.event {
                 self.limits.push(limit.code());

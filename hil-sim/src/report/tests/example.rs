@@ -10,8 +10,7 @@ use crate::session::{Options, run};
 pub(crate) fn deploy() -> Recording {
     static RUN: OnceLock<Recording> = OnceLock::new();
     let run = RUN.get_or_init(|| {
-        let options = Options { rows: true, ..Options::default() };
-        let mut recording = run(&Scenario::default(), options).expect("a run");
+        let mut recording = run(&Scenario::default(), Options::ROWS).expect("a run");
         recording.summary.crossings[1].gap_measured_mm = None;
         recording.stream.clear();
         recording

@@ -23,7 +23,7 @@ use crate::reference::beam::BeamError;
 use crate::reference::vibration::Modal;
 use hil_sim::plant::rig::VirtualRig;
 use hil_sim::report::axis::extent;
-use hil_sim::session::{Options, Session};
+use hil_sim::session::{Options, RunningRig, Session};
 
 /// Crossings of a deployment.
 pub const STAGES: usize = 3;

@@ -17,6 +17,8 @@ use crate::reference::vibration::Arm;
 use hil_sim::plant::balance::{Axial, BalanceError};
 use hil_sim::plant::crossing::{CrossingCase, cross};
 use hil_sim::plant::ring::RingParameters;
+use hil_sim::plant::section::Section;
+use hil_sim::plant::spread::Noise;
 use hil_sim::rollout::{CrossingSetup, Wheel};
 
 /// The safe point, the faster one without and the faster one with more preload.
@@ -183,7 +185,7 @@ impl Hold {
             ),
             of(INTRODUCED, "preload-follows-the-diameter").judged(
                 "At constant speed the radial preload fluctuates with the sleeve's diameter.",
-                swing > hil_sim::plant::spread::Noise::usual().preload_sensor_n,
+                swing > Noise::usual().preload_sensor_n,
                 format!(
                     "By {swing:.2} N on average up to lift-off, with the preload loop closed; the spring \
                      alone would give {unregulated:.1} N a step."
