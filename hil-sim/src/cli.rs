@@ -25,7 +25,6 @@ mod montecarlo;
 pub mod output;
 pub mod params;
 mod parse;
-#[cfg(feature = "probe")]
 mod probe;
 pub mod replay;
 mod report;

@@ -67,7 +67,7 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
 
 #[cfg(not(feature = "probe"))]
 fn on_probe(_: &Args) -> Result<Outcome, Failure> {
-    Ok(Outcome::Code(crate::provision::go_on(crate::provision::Extra::Probe)?))
+    crate::cli::probe::go_on()
 }
 
 #[cfg(feature = "probe")]

@@ -9,7 +9,7 @@ use crate::scenario::Scenario;
 /// Without probe-rs: starts a binary that has it.
 #[cfg(not(feature = "probe"))]
 pub(super) fn on_probe(_: &Args, _: &Scenario, _: Option<&Path>) -> Result<Outcome, Failure> {
-    Ok(Outcome::Code(crate::provision::go_on(crate::provision::Extra::Probe)?))
+    crate::cli::probe::go_on()
 }
 
 #[cfg(feature = "probe")]
