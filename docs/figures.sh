@@ -1,5 +1,5 @@
 #!/bin/sh
-# Writes docs/figures, PERFORMANCE.md and the README's pictures again: two hours on two cores,
+# Writes docs/figures, the tables of `cargo rig bench` and the pictures of runs again: two hours on two cores,
 # most of it the campaign on the emulated board and the comparison. Names of figures as
 # arguments write those alone.
 set -eu
@@ -14,8 +14,8 @@ write() {
 }
 wanted=$*
 write deploy deploy --out target/figures/deploy
-# The README's picture: less friction than nominal. The constant preload does not climb there, so
-# that its run ends with 1.
+# Pictures of runs: a crossing, and two strategies with less friction than nominal. The constant
+# preload does not climb there, so that its run ends with 1.
 case " $wanted " in *" picture "* | "  ")
     for controller in constant scheduled; do
         cargo rig deploy --set plant.mu=0.8 --controller $controller \
@@ -23,6 +23,8 @@ case " $wanted " in *" picture "* | "  ")
     done
     cargo rig report target/figures/constant/log.mcap target/figures/scheduled/log.mcap \
         --picture docs/deployment.svg
+    cargo rig deploy --out target/figures/nominal
+    cargo rig report target/figures/nominal/log.mcap --animation docs/crossing_run.svg
     ;;
 esac
 write retract deploy --retract --no-files

@@ -12,7 +12,7 @@
 //! 5. [`tick::Output`]: the commands of both bridges, and a row for the [`log`].
 //!
 //! A tick is fixed point, without allocation and without waiting, and time is an argument. The async
-//! [`tasks`] around it are generic over one board trait ([`hal`]). All of it builds on the host,
+//! [`tasks`] around it are generic over the traits of a board ([`hal`]). All of it builds on the host,
 //! where the virtual rig runs it:
 //!
 //! ```

@@ -25,21 +25,7 @@ mod montecarlo;
 pub mod output;
 pub mod params;
 mod parse;
-#[cfg(feature = "probe")]
 mod probe;
-#[cfg(not(feature = "probe"))]
-mod probe {
-    use super::{Extra, Failure};
-    use crate::probe::ReconnectingPort;
-
-    pub(super) fn attach(_: Option<u32>) -> Result<ReconnectingPort<'static>, Failure> {
-        Err(Failure::Elsewhere(Extra::Probe))
-    }
-
-    pub(super) fn reconnecting() -> Result<ReconnectingPort<'static>, Failure> {
-        attach(None)
-    }
-}
 pub mod replay;
 mod report;
 pub mod scenario;
@@ -179,6 +165,8 @@ pub fn run<C: Parser>(run: impl FnOnce(&C) -> Result<Outcome, Failure>) -> ExitC
         Err(error) => return parse::report(&error),
     };
     let outcome = run(&cli).or_else(|failure| match failure {
+        #[cfg(not(feature = "probe"))]
+        Failure::Elsewhere(Extra::Probe) => probe::go_on(),
         Failure::Elsewhere(part) => Ok(Outcome::Code(provision::go_on(part)?)),
         failure => Err(failure),
     });

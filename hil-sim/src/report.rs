@@ -1,6 +1,7 @@
 //! A run as one self-contained HTML page: verdict, ledger of the crossings, the
 //! wheel at the steps as an animation, plots over time and over position, each crossing enlarged, log, faults, parameters.
 
+mod animated;
 mod animation;
 pub mod axis;
 mod band;
@@ -19,6 +20,7 @@ pub mod svg;
 mod tables;
 pub(crate) mod verdict;
 
+pub use animated::animated_svg;
 pub use beside::beside_svg;
 pub use compare::{Difference, compare_html, differences, table as compared};
 pub(crate) use page::capital;

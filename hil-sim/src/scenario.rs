@@ -23,8 +23,8 @@ use crate::plant::spread::{Noise, Spread};
 
 pub use error::ScenarioError;
 use keys::Kind;
-pub(crate) use keys::nearest_word;
 pub use keys::{KeyInfo, PRESETS};
+pub(crate) use keys::{leaves, nearest_word};
 use merge::{COMMAND_LINE, Merged, Provenance};
 pub use run::{ControllerKind, Direction, MismatchDraw, RunOptions, StepAnomaly};
 
@@ -113,11 +113,11 @@ impl Scenario {
     pub fn overrides(&self) -> serde_json::Map<String, serde_json::Value> {
         const OWN: [&str; 4] = ["preset", "run.direction", "run.controller", "run.seed"];
         let (ours, preset) = (self.table(), Self::named(&self.preset).unwrap_or_default().table());
-        let preset = keys::leaves(&preset);
+        let preset = leaves(&preset);
         let differs = |(key, value): &(String, &Value)| {
             !OWN.contains(&&**key) && !preset.contains(&(key.clone(), *value))
         };
-        let changed = keys::leaves(&ours).into_iter().filter(differs);
+        let changed = leaves(&ours).into_iter().filter(differs);
         changed.map(|(key, value)| (key, serde_json::json!(value))).collect()
     }
 

@@ -49,6 +49,13 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
              probe-rs-tools` gets it"
         )));
     }
+    // Reported before minutes of building.
+    let list = Command::new(&program).arg("list").output().map_err(missing)?;
+    if String::from_utf8_lossy(&list.stdout).contains("No debug probes were found") {
+        return Err(Failure::input(
+            "no debug probe is attached: connect the board's ST-LINK by USB",
+        ));
+    }
     let elf = firmware::build(Profile::Release)?;
     let mut command = Command::new(&program);
     command.args(["run", "--chip", CHIP, "--verify"]).args(PLAIN).args(&args.more).arg(elf);

@@ -9,7 +9,9 @@ use super::output::{self, WithFiles};
 use super::terminal;
 use crate::files::{make_directory, vacant_for, write_text};
 use crate::record::{Recording, Summary, log_at, recordings};
-use crate::report::{Difference, beside_svg, compare_html, compared, differences, log_html};
+use crate::report::{
+    Difference, animated_svg, beside_svg, compare_html, compared, differences, log_html,
+};
 use crate::table::plain;
 
 /// The page of a log as `deploy` writes it, or of two logs crossing by crossing.
@@ -35,6 +37,10 @@ pub(super) struct Args {
     #[arg(long, value_name = "FILE", requires = "other")]
     picture: Option<PathBuf>,
 
+    /// Writes a crossing of the run as an animated SVG into this file.
+    #[arg(long, value_name = "FILE", conflicts_with = "other")]
+    animation: Option<PathBuf>,
+
     /// Every column of the table of crossings.
     #[arg(short, long)]
     verbose: bool,
@@ -48,7 +54,9 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     let log = log_at(&args.log);
     let other = args.other.as_deref().map(log_at);
     let inputs: Vec<&Path> = [Some(&*log), other.as_deref()].into_iter().flatten().collect();
-    for (name, to) in [("--out", &args.out), ("--picture", &args.picture)] {
+    let outputs =
+        [("--out", &args.out), ("--picture", &args.picture), ("--animation", &args.animation)];
+    for (name, to) in outputs {
         to.as_ref().map_or(Ok(()), |to| output::spare(name, to, &inputs))?;
     }
     let boots = recordings(&log).map_err(Failure::input)?;
@@ -67,7 +75,14 @@ fn page(args: &Args, log: &Path, ending: &str, text: &str) -> Result<PathBuf, Fa
 }
 
 fn one(args: &Args, log: &Path, boots: &[Recording]) -> Result<Outcome, Failure> {
-    let files = [page(args, log, "html", &log_html(boots))?];
+    let mut files = vec![page(args, log, "html", &log_html(boots))?];
+    if let Some(to) = &args.animation {
+        let picture = animated_svg(only(log, boots)?);
+        let none =
+            || Failure::input(format!("--animation: {}: no crossing is in it", log.display()));
+        write_text(to, &picture.ok_or_else(none)?)?;
+        files.push(to.clone());
+    }
     let human = || {
         let one = |(n, boot): (usize, &Recording)| {
             let text = terminal::run(&boot.summary, &[], args.verbose);

@@ -30,7 +30,6 @@ pub fn svg(rows: &[&Residuals]) -> String {
                 "drive effort" => palette::SPEED,
                 _ => palette::PRELOAD,
             },
-            shift: 0,
             points: row.series.clone(),
         }],
         levels: [-1.0, 1.0].map(|end| ("95 %", Look::Limit, end * NORMAL_95 * row.rms)).to_vec(),
@@ -57,8 +56,9 @@ mod tests {
         };
         let (first, second) = (row("compression"), row("preload"));
         let svg = svg(&[&first, &second]);
-        // Rim and body of each, and of the two names.
-        assert_eq!(svg.matches("<circle").count(), 2 * (6 + 2));
+        // Rim and body of all three, and of the legend's.
+        assert_eq!(svg.matches("h0\"/>").count(), 2 * (2 + 2));
+        assert_eq!(svg.matches("h0M").count(), 2 * 2 * 2);
         assert!(svg.contains("a.csv, compression: rms 1.00e-1 mm, 3 values"), "{svg}");
         assert!(svg.contains("time, s"));
     }

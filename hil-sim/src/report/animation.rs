@@ -1,8 +1,7 @@
-//! The section that shows why the preload rises: a sentence for each crossing, still pictures of
-//! its two instants, and the animation that a script draws.
+//! The section that shows why the preload rises: still pictures of a crossing's two instants, and
+//! the animation that a script draws.
 
 use super::scene::{Event, Geometry, Scene};
-use super::tables::table;
 use super::verdict::GAP_TOLERANCE;
 use crate::table::number;
 
@@ -18,7 +17,9 @@ drawn.</p>\n"
             .to_owned();
     };
     let mut html = format!("<p>{}</p>\n", why(scene));
-    html += &sentences(scene);
+    if scene.crossings.is_empty() {
+        html += "<p>No step was crossed.</p>\n";
+    }
     html += STAGE;
     html += &format!("<p class=\"note\">{}</p>\n", legend(scene));
     if let Some(first) = scene.crossings.first() {
@@ -71,32 +72,6 @@ fn at_the_steps(scene: &Scene) -> String {
     }
 }
 
-/// What the preload did at each crossing.
-fn sentences(scene: &Scene) -> String {
-    if scene.crossings.is_empty() {
-        return "<p>No step was crossed.</p>\n".to_owned();
-    }
-    let head = [
-        "step",
-        "speed<br>mm/s",
-        "preload<br>N",
-        "gap<br>mm",
-        "gap with the preload of the smooth wall<br>mm, by the model",
-        "first touch before the face<br>mm",
-    ];
-    let rows = scene.crossings.iter().map(|c| {
-        vec![
-            c.index.to_string(),
-            number(c.speed_mm_s, 2),
-            number(c.preload_n, 1),
-            number(c.gap_mm, 2),
-            number(c.gap_at_cruise_mm, 2),
-            if scene.retracts { number(None, 0) } else { number(c.touch_mm, 1) },
-        ]
-    });
-    table("ledger", &head.map(str::to_owned), rows.collect())
-}
-
 fn legend(scene: &Scene) -> String {
     let forces = if scene.measured {
         "This is a captured log: position, radius, compression and preload are those that the \
@@ -104,7 +79,8 @@ controller measured or estimated, the clearance follows from them, and the force
 wall are not measured."
     } else {
         "Arrows: preload on the axle, force of the wall under it, force of the corner, drawn from \
-the edge towards the axle."
+the edge towards the axle. The second picture is the corner, five times as large: the areas are the forces \
+of wall and corner, spread as deep as the tread is pressed in, the arc is the reference gap."
     };
     format!(
         "{forces} Lengths are true to scale, the pillar is at the top. Dashed: the undeformed \

@@ -1,12 +1,15 @@
 //! Two runs side by side, crossing by crossing.
 
-use super::beside::beside_svg;
+use std::collections::{BTreeMap, BTreeSet};
+
 use super::ledger::{COLUMNS, Column};
-use super::page::{head, section};
+use super::page::{SIZE, end, folded, head, section};
+use super::panels::{Across, figure};
 use super::svg::escape;
-use super::tables;
-use super::verdict::{gap_sentence, headline};
+use super::verdict::{Grade, gap_sentence, headline, origin, verdict};
+use super::{beside, tables};
 use crate::record::{CrossingLine, Recording};
+use crate::scenario::{brief, leaves};
 use crate::table::number;
 
 /// A difference between the two runs at a crossing.
@@ -59,22 +62,59 @@ fn pairs<'a>(a: &'a Recording, b: &'a Recording) -> Vec<Pair<'a>> {
     pairs
 }
 
-/// The page of two runs with their names.
+/// The page of two runs with their names, each on the time since its command.
 pub fn compare_html((name_a, a): (&str, &Recording), (name_b, b): (&str, &Recording)) -> String {
+    let (a, b) = (&a.since_command(), &b.since_command());
     let mut page = head("two runs");
     for (letter, name, run) in [("A", name_a, a), ("B", name_b, b)] {
+        let sentences = [verdict(&run.summary), gap_sentence(&run.summary)];
+        let sentence = sentences.join("; ");
+        let sentence = sentence.trim_start_matches("; ");
         page += &format!(
-            "<header>\n<p class=\"what\">{letter}: {}</p>\n<p><b>{}</b>; {}</p>\n</header>\n",
+            "<header class=\"{}\">\n<p class=\"what\">{letter}: {} · {}</p>\n<h1>{}</h1>\n\
+<p>{}</p>\n</header>\n",
+            Grade::of(&run.summary).name(),
             escape(name),
+            escape(&origin(&run.summary)),
             escape(&headline(&run.summary)),
-            escape(&gap_sentence(&run.summary)),
+            escape(sentence),
         );
     }
-    let (head, rows) = table(&differences(a, b));
-    page += &section("Crossing by crossing", &tables::table("ledger", &head, rows));
-    let picture = beside_svg([("A", a), ("B", b)]);
-    page += &section("Over time", &format!("<figure class=\"wide\">{picture}</figure>\n"));
-    page + "</main>\n</body>\n</html>\n"
+    page += &section("Parameters that differ", &parameters(a, b));
+    let all = differences(a, b);
+    let (first, rest): (Vec<_>, Vec<_>) = all.into_iter().partition(|one| {
+        COLUMNS.iter().any(|column| column.on_terminal && column.name == one.quantity)
+    });
+    let ledger = |rows: &[Difference]| {
+        let (head, rows) = table(rows);
+        tables::table("ledger pairs", &head, rows)
+    };
+    let more = folded("The other quantities", &ledger(&rest));
+    page += &section("Crossing by crossing", &(ledger(&first) + &more));
+    let plots: String = beside::panels([("A", a), ("B", b)])
+        .iter()
+        .rev()
+        .map(|panel| figure(panel, Across::Time, SIZE, &panel.title))
+        .collect();
+    page += &section("Over time from the command", &plots);
+    page + &end("", "")
+}
+
+/// The keys in which the parameters of two runs differ, with both values.
+fn parameters(a: &Recording, b: &Recording) -> String {
+    let [a, b] = [a, b].map(|run| run.parameters.parse::<toml::Table>().unwrap_or_default());
+    let [a, b] = [&a, &b].map(|table| BTreeMap::from_iter(leaves(table)));
+    let keys: BTreeSet<&String> = a.keys().chain(b.keys()).collect();
+    let shown = |value: Option<&&toml::Value>| {
+        value.map_or_else(|| "-".to_owned(), |value| escape(&brief(&serde_json::json!(value))))
+    };
+    let differ = keys.into_iter().filter(|key| a.get(*key) != b.get(*key));
+    let rows: Vec<_> =
+        differ.map(|key| vec![escape(key), shown(a.get(key)), shown(b.get(key))]).collect();
+    if rows.is_empty() {
+        return "<p>None: both runs have the same parameters.</p>\n".to_owned();
+    }
+    tables::table("lines", &["key", "A", "B"].map(str::to_owned), rows)
 }
 
 /// The differences as a table's head and rows.
@@ -111,12 +151,21 @@ mod tests {
     }
 
     #[test]
-    fn the_page_shows_both_runs() {
-        let (a, b) = (example::deploy(), example::faulted());
+    fn the_page_shows_both_runs_with_their_verdicts_and_what_differs() {
+        let (a, mut b) = (example::deploy(), example::faulted());
         let page = compare_html(("one.mcap", &a), ("two <2>.mcap", &b));
         assert!(page.contains("A: one.mcap") && page.contains("B: two &lt;2&gt;.mcap"));
         assert!(page.contains("fault 121") && page.contains("B - A"));
-        assert_eq!(page.matches("<svg").count(), 1);
-        assert!(!page.contains("NaN"));
+        assert!(
+            page.contains("<header class=\"good\">") && page.contains("<header class=\"bad\">")
+        );
+        assert!(page.contains("same parameters"));
+        // Gap, slip, position, speed and preload, each since its own command.
+        assert_eq!(page.matches("<figure").count(), 5);
+        assert!(page.contains("gap, % of reference") && !page.contains("NaN"));
+        b.parameters = b.parameters.replace("limit_n = 50.0", "limit_n = 48.5");
+        let page = compare_html(("one.mcap", &a), ("two.mcap", &b));
+        let row = "<tr><td>preload.limit_n</td><td>50</td><td>48.5</td></tr>";
+        assert_eq!(page.matches(row).count(), 1, "{page}");
     }
 }

@@ -38,7 +38,7 @@ fn one(recording: &Recording, line: &CrossingLine) -> String {
 }
 
 /// The rows around `line`.
-fn view<'a>(recording: &'a Recording, line: &CrossingLine) -> View<'a> {
+pub(super) fn view<'a>(recording: &'a Recording, line: &CrossingLine) -> View<'a> {
     let (first, last) = (line.touch_s.min(line.lift_s), line.touch_s.max(line.lift_s));
     let x = (-BEFORE_S, last - first + AFTER_S);
     let rows = &recording.rows;
@@ -70,14 +70,14 @@ fn panels(view: &View) -> Vec<Panel> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::{example, svg};
+    use crate::report::example;
 
     #[test]
     fn every_crossing_has_its_plots() {
         let recording = example::deploy();
         let html = html(&recording);
         assert_eq!(html.matches("<h3>").count(), 3);
-        assert_eq!(html.matches("<svg").count(), 18);
+        assert_eq!(html.matches("<figure").count(), 18);
     }
 
     #[test]
@@ -106,8 +106,13 @@ mod tests {
         for (line, measured) in recording.summary.crossings.iter().zip([true, false, true]) {
             let view = view(&recording, line);
             let panel = &panels(&view)[2];
-            let text = svg::fluid(SIZE, "", |area| panel.draw(area));
-            assert_eq!(text.contains("\nmeasured\n"), measured, "crossing {}", line.index);
+            let text = panel.figure("", SIZE, "");
+            assert_eq!(
+                text.contains("<span data-name=\"measured\">"),
+                measured,
+                "crossing {}",
+                line.index
+            );
         }
     }
 }

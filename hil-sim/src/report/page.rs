@@ -1,18 +1,17 @@
 //! The page around the plots.
 
 use super::panel::Panel;
-use super::panels::{Across, View, attributes, figure, motion};
+use super::panels::{Across, View, figure, motion};
 use super::scene::Scene;
-use super::svg::{self, escape};
+use super::svg::escape;
 use super::verdict::{Grade, gap_sentence, headline, origin, slip_sentence, verdict};
-use super::{animation, band, crossings, tables};
+use super::{animation, crossings, tables};
 use crate::record::Recording;
 
 const STYLE: &str = include_str!("style.css");
+const PLOTS: &str = include_str!("plots.js");
 /// Size of a plot of the run, CSS pixels.
-const SIZE: (u32, u32) = (1100, 240);
-/// Size of the bands, CSS pixels.
-const BAND_SIZE: (u32, u32) = (1100, 175);
+pub(super) const SIZE: (u32, u32) = (1100, 210);
 
 /// A section of a page beside those that every run has.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -76,13 +75,12 @@ and the undeformed wheel at the instant at which the lower wall stops carrying l
     page += &section("Parameters", &(tables::overrides(s) + &all));
     page += &format!(
         "<footer>\n<p>Written by hil-sim {} with the controller interstage {}.</p>\n\
-<p>Trace digest, SHA-256: <code>{}</code></p>\n</footer>\n</main>\n{}</body>\n</html>\n",
+<p>Trace digest, SHA-256: <code>{}</code></p>\n</footer>\n",
         env!("CARGO_PKG_VERSION"),
         env!("CARGO_PKG_VERSION"),
         escape(&s.trace_digest),
-        scene.as_ref().map(animation::script).unwrap_or_default(),
     );
-    page
+    page + &end(&track(recording), &scene.as_ref().map(animation::script).unwrap_or_default())
 }
 
 /// The page of a log: of one start of the target as [`html`], of several a section each.
@@ -110,6 +108,7 @@ pub fn log_html(boots: &[Recording]) -> String {
             folded("The crossings enlarged", &crossings::html(boot)),
             folded("Lines of the log", &tables::log(&boot.log)),
         );
+        let body = format!("<div data-clock>\n{body}</div>\n");
         section(&format!("Start {} of {}", n + 1, boots.len()), &body)
     };
     let sections: String = boots.iter().enumerate().map(one).collect();
@@ -126,8 +125,25 @@ pub fn page_of(title: &str, grade: &str, headline: &str, body: &str) -> String {
     head(&title)
         + &format!(
             "<header class=\"{grade}\">\n<p class=\"what\">interstage · {title}</p>\n\
-<h1>{headline}</h1>\n</header>\n{body}</main>\n</body>\n</html>\n"
+<h1>{headline}</h1>\n</header>\n{body}"
         )
+        + &end("", "")
+}
+
+/// The end of a page: the plots' script between its data and other scripts.
+pub(super) fn end(data: &str, others: &str) -> String {
+    format!("</main>\n{data}<script>\n{PLOTS}</script>\n{others}</body>\n</html>\n")
+}
+
+/// Times and positions, by which the cursors of plots over either go together.
+fn track(recording: &Recording) -> String {
+    let rows = &recording.rows;
+    let part = rows.iter().step_by(rows.len() / 2000 + 1);
+    let pairs = part.map(|row| (row.controller.t_s, row.position_mm()));
+    let pairs = pairs.filter(|pair| pair.1.is_finite());
+    let pairs: Vec<String> = pairs.map(|(t, x)| format!("[{t:.3},{x:.3}]")).collect();
+    let pairs = pairs.join(",");
+    format!("<script type=\"application/json\" id=\"track\">[{pairs}]</script>\n")
 }
 
 /// The beginning of a page, up to its content.
@@ -143,7 +159,7 @@ pub(super) fn section(title: &str, body: &str) -> String {
     format!("<section>\n<h2>{title}</h2>\n{body}</section>\n")
 }
 
-fn folded(title: &str, body: &str) -> String {
+pub(super) fn folded(title: &str, body: &str) -> String {
     format!("<details>\n<summary>{title}</summary>\n{body}</details>\n")
 }
 
@@ -184,10 +200,7 @@ fn stack(recording: &Recording, across: Across) -> String {
         let name = format!("{}, {}", panel.title, across.name());
         html += &figure(&panel, across, SIZE, &name);
     }
-    let name = format!("Mode, contact stage and sleeve level, {}", across.name());
-    let bands = svg::fluid(BAND_SIZE, &name, |area| band::draw(&view, area));
-    let frame = attributes(view.x, across, band::frame(BAND_SIZE));
-    html + &format!("<figure {frame}>{bands}{}</figure>\n", band::legend(&recording.rows))
+    html
 }
 
 fn count(n: usize, what: &str) -> String {

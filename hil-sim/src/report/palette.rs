@@ -4,12 +4,12 @@
 use plotters::style::RGBColor;
 
 pub const TRUTH: RGBColor = RGBColor(0x1f, 0x29, 0x37);
-/// References; drawn dashed, see `DASHES`.
+/// References; drawn dashed.
 pub(crate) const WANTED: RGBColor = RGBColor(0x6b, 0x72, 0x80);
-/// Limits; drawn dashed, see `DASHES`.
+/// Limits; drawn dashed.
 pub(crate) const LIMIT: RGBColor = RGBColor(0xb9, 0x1c, 0x1c);
 
-/// First touch of a corner; drawn dashed, see `DASHES`.
+/// First touch of a corner; drawn dashed.
 pub(crate) const TOUCH: RGBColor = RGBColor(0xb4, 0x53, 0x09);
 /// Face of a step.
 pub(crate) const FACE: RGBColor = RGBColor(0x64, 0x74, 0x8b);
@@ -17,7 +17,7 @@ pub(crate) const FACE: RGBColor = RGBColor(0x64, 0x74, 0x8b);
 /// A limit that was reported.
 pub(crate) const WARNING: RGBColor = RGBColor(0xd9, 0x9a, 0x06);
 
-/// Simulated by the reference models; drawn dashed, see `DASHES`.
+/// Simulated by the reference models; drawn dashed.
 pub const SIMULATED: RGBColor = RGBColor(0x1c, 0x6f, 0xd6);
 
 pub const SPEED: RGBColor = RGBColor(0x1d, 0x7f, 0xe0);
@@ -37,10 +37,6 @@ pub(crate) const AXIS: RGBColor = RGBColor(0x9c, 0xa3, 0xaf);
 pub const GRID: RGBColor = RGBColor(0xe9, 0xeb, 0xef);
 /// Shaded stretches.
 pub(crate) const SHADE: RGBColor = RGBColor(0xfa, 0xf1, 0xdf);
-
-/// Stroke colours that are drawn dashed, as SVG writes them, with their dashes.
-pub(crate) const DASHES: [(&str, &str); 4] =
-    [("#6B7280", "11 7"), ("#B91C1C", "22 8"), ("#1C6FD6", "16 8"), ("#B45309", "5 6")];
 
 /// Pale fills for the modes, by mode number.
 pub const MODES: [RGBColor; 13] = [

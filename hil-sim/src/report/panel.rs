@@ -1,32 +1,30 @@
-//! One plot: lines, marks, levels and shaded spans on one pair of axes, with the
-//! title and the legend above it, where they cover no data.
+//! One plot: lines, marks, levels, shaded spans and bands on one pair of axes, as SVG. What is in
+//! the plot has its own units, in an inner picture that the page's script can move and stretch.
 
 use std::borrow::Cow;
 
-use plotters::prelude::*;
-use plotters::style::text_anchor::{HPos, VPos};
+use plotters::style::RGBColor;
 
-use super::axis::{self, Scale};
-use super::decimate::{decimate, inside};
-use super::mesh::{self, TEXT_PX};
+use super::axis;
+use super::decimate::decimate;
+use super::mesh::TEXT_PX;
 use super::palette;
-use super::svg::{Area, Drawn, SCALE, font, text_width};
+use super::svg::{escape, hex, width};
 
-const S: i32 = SCALE as i32;
-/// Height of the row with title and legend.
-pub(super) const HEAD: i32 = 30 * S;
-/// Left of everything.
-const MARGIN: i32 = 4 * S;
-/// Left of the plot: tick labels and the name of the axis.
-pub(super) const LEFT: i32 = 72 * S;
+/// Left of the plot: tick labels and the name of the axis, CSS pixels.
+const LEFT: f64 = 66.0;
 /// Right of the plot: half a tick label.
-pub(super) const RIGHT: i32 = 18 * S;
-/// Height of the row of a legend below the title.
-const LEGEND: i32 = 20 * S;
-const TITLE_PX: f64 = 14.0;
-/// Height of the row with the names of the rules.
-const RULES: i32 = 16 * S;
+const RIGHT: f64 = 18.0;
+/// Above the plot: the names of the rules.
+const RULES: f64 = 16.0;
 const RULE_PX: f64 = 11.0;
+/// Below the plot: labels of the ticks and the name of the axis.
+const BELOW: f64 = 38.0;
+/// Heights of the title and of a legend below it, in a picture that is no page's.
+const HEAD: f64 = 30.0;
+const LEGEND: f64 = 20.0;
+const GRID: &str = "#e9ebef";
+const TITLE_PX: f64 = 14.0;
 
 /// What a line shows.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -46,17 +44,35 @@ pub(crate) enum Look {
 }
 
 impl Look {
-    /// Order of drawing, wide lines below thin ones, and the stroke.
-    fn style(self) -> (u8, ShapeStyle) {
+    /// Order of drawing, wide lines below thin ones; colour and width, CSS pixels.
+    fn style(self) -> (u8, RGBColor, f64) {
         match self {
-            Self::Truth => (0, palette::TRUTH.stroke_width(7)),
-            Self::Other(colour) => (1, colour.stroke_width(4)),
-            Self::Measured(colour) => (2, colour.stroke_width(3)),
-            Self::Estimate(colour) => (3, colour.stroke_width(3)),
-            Self::Wanted => (4, palette::WANTED.stroke_width(3)),
-            Self::Limit => (5, palette::LIMIT.stroke_width(2)),
+            Self::Truth => (0, palette::TRUTH, 3.0),
+            Self::Other(colour) => (1, colour, 2.0),
+            Self::Measured(colour) => (2, colour, 1.5),
+            Self::Estimate(colour) => (3, colour, 1.5),
+            Self::Wanted => (4, palette::WANTED, 1.5),
+            Self::Limit => (5, palette::LIMIT, 1.2),
         }
     }
+
+    /// Attributes of a stroke.
+    fn stroke(self) -> String {
+        let (_, colour, width) = self.style();
+        stroke(colour, width)
+    }
+}
+
+/// Attributes of a stroke: dashed where the colour is one of dashed lines, else with a class that
+/// gives the page's script and style the colour.
+fn stroke(colour: RGBColor, width: f64) -> String {
+    let dashes = match colour {
+        palette::WANTED => " stroke-dasharray=\"5 3\"",
+        palette::LIMIT => " stroke-dasharray=\"10 4\"",
+        palette::TOUCH => " stroke-dasharray=\"2 3\"",
+        _ => "",
+    };
+    format!("stroke=\"{}\" stroke-width=\"{width}\"{dashes}", hex(colour))
 }
 
 pub(crate) struct Line {
@@ -66,21 +82,38 @@ pub(crate) struct Line {
     pub(crate) points: Vec<(f64, f64)>,
 }
 
-/// Shape of a mark.
+/// Shape of a mark. Those of one place can be seen beside each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Shape {
     Dot,
     Ring,
-    Triangle,
+    Square,
+}
+
+impl Shape {
+    /// The strokes of a mark, from below: class, cap and width, CSS pixels.
+    fn strokes(self) -> &'static [(&'static str, &'static str, f64)] {
+        match self {
+            Self::Dot => &[("rim", "round", 9.0), ("mark", "round", 7.0)],
+            Self::Ring => &[("mark", "round", 15.0), ("rim", "round", 11.0)],
+            Self::Square => &[("rim", "square", 13.0), ("mark", "square", 11.0)],
+        }
+    }
 }
 
 pub(crate) struct Marks {
     pub(crate) name: Cow<'static, str>,
     pub(crate) shape: Shape,
     pub(crate) colour: RGBColor,
-    /// Shift to the right, drawing units, so that marks of one place are side by side.
-    pub(crate) shift: i32,
     pub(crate) points: Vec<(f64, f64)>,
+}
+
+/// A stretch of a band.
+pub(crate) struct Stretch {
+    pub(crate) from: f64,
+    pub(crate) to: f64,
+    pub(crate) name: String,
+    pub(crate) colour: RGBColor,
 }
 
 /// One plot.
@@ -96,8 +129,12 @@ pub(crate) struct Panel {
     pub(crate) y: Option<(f64, f64)>,
     /// Least vertical span, so that noise is not blown up.
     pub(crate) least_span: f64,
+    /// What one of the vertical axis is besides, and in which unit.
+    pub(crate) also: Option<(f64, &'static str)>,
     pub(crate) lines: Vec<Line>,
     pub(crate) marks: Vec<Marks>,
+    /// Bands with their names, in place of lines.
+    pub(crate) bands: Vec<(&'static str, Vec<Stretch>)>,
     /// Horizontal lines with their names.
     pub(crate) levels: Vec<(&'static str, Look, f64)>,
     /// Spans of x that are shaded.
@@ -115,272 +152,397 @@ pub(crate) struct Rule {
     pub(crate) colour: RGBColor,
 }
 
-/// More height for the last of stacked plots, which has the axis, CSS pixels.
-const AXIS_HEIGHT: u32 = 36;
+/// Plots over one axis, one below the other, as an SVG of this size on white, CSS pixels.
+pub(crate) fn stacked((wide, high): (u32, u32), panels: &mut [Panel]) -> String {
+    let each = (f64::from(high) - BELOW) / panels.len().max(1) as f64;
+    let last = panels.len().saturating_sub(1);
+    let mut svg = format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{wide}\" height=\"{high}\" \
+viewBox=\"0 0 {wide} {high}\">\n<style>.data path {{ vector-effect: non-scaling-stroke; }}</style>\n<rect width=\"{wide}\" height=\"{high}\" fill=\"white\"/>\n"
+    );
+    for (place, panel) in panels.iter_mut().enumerate() {
+        panel.x_name = panel.x_name.filter(|_| place == last);
+        let high = if place == last { each + BELOW } else { each };
+        let (plot, _) = panel.small((f64::from(wide), high));
+        let down = place as f64 * each;
+        svg += &format!("<g transform=\"translate(0 {down:.1})\">\n{plot}</g>\n");
+    }
+    svg + "</svg>\n"
+}
 
-/// Plots over one axis, one below the other, as an SVG of this size, CSS pixels.
-pub(crate) fn stacked(size: (u32, u32), panels: &mut [Panel]) -> String {
-    let Some((last, above)) = panels.split_last_mut() else { return String::new() };
-    let height = SCALE * (size.1 - AXIS_HEIGHT) / (above.len() as u32 + 1);
-    super::svg::fixed(size, |area| {
-        let mut rest = area.clone();
-        for panel in above {
-            panel.x_name = None;
-            let (top, below) = rest.split_vertically(height);
-            panel.draw(&top)?;
-            rest = below;
-        }
-        last.draw(&rest)
-    })
+/// `value` with no more digits than a `part` of 10^4 of `range` needs.
+fn digits(value: f64, range: (f64, f64)) -> f64 {
+    let scale = 10_f64.powf((3.5 - (range.1 - range.0).log10()).ceil());
+    (value * scale).round() / scale + 0.0
 }
 
 impl Panel {
-    /// Where the plot is in a picture of `size` CSS pixels: left, right, top and bottom, in
-    /// drawing units.
-    pub(crate) fn frame(&self, size: (u32, u32)) -> [i32; 4] {
-        let (wide, high) = ((size.0 * SCALE) as i32, (size.1 * SCALE) as i32);
-        let top = self.head_height(wide) + self.top();
-        [LEFT, wide - RIGHT, top, high - self.bottom()]
+    /// The plot as a figure of a page, `attributes` and its `name` for screen readers with it. Title and
+    /// legend are text, so that they wrap, and have room for the values at the cursor.
+    pub(crate) fn figure(&self, attributes: &str, (wide, high): (u32, u32), name: &str) -> String {
+        let (x, y) = (self.x, self.y_range());
+        let also = self
+            .also
+            .map_or_else(String::new, |(factor, unit)| format!(" data-also=\"{factor} {unit}\""));
+        let legend: String = self.legend().iter().map(Sample::html).collect();
+        format!(
+            "<figure {attributes} data-x=\"{} {}\" data-y=\"{} {}\" \
+data-least=\"{}\"{also}>\n<figcaption><b>{}</b><output></output>{legend}</figcaption>\n\
+<svg class=\"plot\" viewBox=\"0 0 {wide} {high}\" role=\"img\" aria-label=\"{}\">\n{}</svg></figure>\n",
+            x.0,
+            x.1,
+            y.0,
+            y.1,
+            self.least_span,
+            escape(&self.title),
+            escape(name),
+            self.plot((f64::from(wide), f64::from(high))),
+        )
     }
 
-    /// Height above the plot: the names of the rules.
-    fn top(&self) -> i32 {
-        if self.rules.is_empty() { 2 * S } else { RULES }
+    /// Title and plot in a picture of this size, and where the plot is: left, right, top, bottom; CSS
+    /// pixels.
+    pub(super) fn small(&self, (wide, high): (f64, f64)) -> (String, [f64; 4]) {
+        let (head, taken) = self.head(wide);
+        let plot = self.plot((wide, high - taken));
+        let svg = format!("{head}<g transform=\"translate(0 {taken})\">\n{plot}</g>\n");
+        (svg, [LEFT, wide - RIGHT, taken + RULES, high - self.below()])
     }
 
-    /// Height below the plot.
-    fn bottom(&self) -> i32 {
-        if self.x_name.is_some() { 40 * S } else { 6 * S }
+    /// Height below the plot, CSS pixels.
+    fn below(&self) -> f64 {
+        if self.x_name.is_some() { BELOW } else { 6.0 }
     }
 
-    /// Draws it into `area`.
-    pub(crate) fn draw(&self, area: &Area) -> Drawn {
-        let (head, body) = area.split_vertically(self.head_height(area.dim_in_pixel().0 as i32));
-        self.draw_head(&head)?;
-        let y = self.y_range();
-        let (wide, high) = body.dim_in_pixel();
-        let most_x = (wide as i32 / (75 * S)).max(2) as usize;
-        let most_y = (high as i32 / (27 * S)).clamp(2, 7) as usize;
-        let (x_ticks, x_decimals) = axis::ticks(self.x, most_x);
-        let (y_ticks, y_decimals) = axis::ticks(y, most_y);
-        let mut chart = ChartBuilder::on(&body)
-            .margin_left(MARGIN)
-            .margin_right(RIGHT)
-            .margin_top(self.top())
-            .x_label_area_size(self.bottom())
-            .y_label_area_size(LEFT - MARGIN)
-            .build_cartesian_2d(Scale::new(self.x, x_ticks), Scale::new(y, y_ticks))?;
-        for &(from, to) in &self.shades {
-            let (from, to) = (from.max(self.x.0), to.min(self.x.1));
-            if from < to {
-                let span = Rectangle::new([(from, y.0), (to, y.1)], palette::SHADE.filled());
-                chart.draw_series([span])?;
+    /// Axes, names and data in a picture of this size, CSS pixels.
+    fn plot(&self, (wide, high): (f64, f64)) -> String {
+        let (x, y) = (self.x, self.y_range());
+        let bottom = high - self.below();
+        let (across, down) = (wide - LEFT - RIGHT, bottom - RULES);
+        let x_at = |value: f64| LEFT + (value - x.0) / (x.1 - x.0) * across;
+        let y_at = |value: f64| bottom - (value - y.0) / (y.1 - y.0) * down;
+        let text = |at: (f64, f64), anchor: &str, more: &str, text: &str| {
+            format!(
+                "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"{anchor}\"{more}>{}</text>\n",
+                at.0,
+                at.1,
+                escape(text)
+            )
+        };
+        let mut axes = String::new();
+        let (ticks, decimals) = axis::ticks(x, (wide / 75.0).max(2.0) as usize);
+        for tick in ticks {
+            let at = x_at(tick);
+            axes += &format!(
+                "<path class=\"grid\" stroke=\"{GRID}\" d=\"M{at:.1} {RULES}V{bottom:.1}\"/>\n"
+            );
+            if self.x_name.is_some() {
+                axes += &text((at, bottom + 16.0), "middle", "", &axis::label(tick, decimals));
             }
         }
-        mesh::plain(&mut chart.configure_mesh())
-            .x_label_formatter(&|x| match self.x_name {
-                Some(_) => axis::label(*x, x_decimals),
-                None => String::new(),
-            })
-            .y_label_formatter(&|y| axis::label(*y, y_decimals))
-            .x_desc(self.x_name.unwrap_or_default())
-            .y_desc(self.y_name)
-            .draw()?;
-        for &(_, look, level) in self.levels.iter().filter(|level| (y.0..=y.1).contains(&level.2)) {
-            let ends = [(self.x.0, level), (self.x.1, level)];
-            chart.draw_series([PathElement::new(ends, look.style().1)])?;
+        let (ticks, decimals) = axis::ticks(y, (high / 27.0).clamp(2.0, 7.0) as usize);
+        for tick in ticks.into_iter().filter(|_| self.bands.is_empty()) {
+            let at = y_at(tick);
+            let right = wide - RIGHT;
+            axes += &format!(
+                "<path class=\"grid\" stroke=\"{GRID}\" d=\"M{LEFT} {at:.1}H{right}\"/>\n"
+            );
+            axes += &text((LEFT - 6.0, at + 4.0), "end", "", &axis::label(tick, decimals));
         }
+        let mut names = String::new();
+        let middle = LEFT + 0.5 * across;
+        if let Some(name) = self.x_name {
+            names += &text((middle, bottom + 33.0), "middle", " class=\"across\"", name);
+        }
+        let turned = format!(" transform=\"rotate(-90 14 {0:.1})\"", RULES + 0.5 * down);
+        names += &text((14.0, RULES + 0.5 * down), "middle", &turned, self.y_name);
+        for (place, (name, _)) in self.bands.iter().enumerate() {
+            names += &text((LEFT - 6.0, y_at(-0.5 - place as f64) + 4.0), "end", "", name);
+        }
+        let size = format!(" font-size=\"{RULE_PX}\"");
+        let mut labels = String::new();
+        for (at, side, rule) in self.rule_names(x_at, wide) {
+            let more = format!("{size} fill=\"{}\"", hex(rule.colour));
+            labels += &text((at, 0.75 * RULES), side, &more, &rule.name);
+        }
+        for (place, (_, stretches)) in self.bands.iter().enumerate() {
+            for Stretch { from, to, name, .. } in stretches {
+                let (from, to) = (x_at(from.max(x.0)), x_at(to.min(x.1)));
+                if width(name, RULE_PX) + 4.0 <= to - from {
+                    let at = (0.5 * (from + to), y_at(-0.5 - place as f64) + 4.0);
+                    let more = format!("{size} fill=\"#1f2937\"");
+                    labels += &text(at, "middle", &more, name);
+                }
+            }
+        }
+        format!(
+            "<g class=\"text\" font-family=\"sans-serif\" font-size=\"{TEXT_PX}\" fill=\"#374151\">\n\
+<g class=\"axes\">\n{axes}</g>\n{names}</g>\n<svg class=\"data\" x=\"{LEFT}\" y=\"{RULES}\" width=\"{across}\" \
+height=\"{down}\" viewBox=\"{} {} {} {}\" preserveAspectRatio=\"none\">\n\
+<g transform=\"scale(1 -1)\" fill=\"none\">\n{}</g></svg>\n\
+<path class=\"axis\" fill=\"none\" stroke=\"#9ca3af\" d=\"M{LEFT} {RULES}V{bottom:.1}H{:.1}\"/>\n\
+<g class=\"labels\" font-family=\"sans-serif\">\n{labels}</g>\n",
+            x.0,
+            -y.1,
+            x.1 - x.0,
+            y.1 - y.0,
+            self.data(across),
+            wide - RIGHT,
+        )
+    }
+
+    /// Where the names of the rules are: touches behind the others; a name that would be on another one is left
+    /// out.
+    fn rule_names(&self, x_at: impl Fn(f64) -> f64, wide: f64) -> Vec<(f64, &'static str, &Rule)> {
+        let mut taken: Vec<(f64, f64)> = Vec::new();
+        let is_touch = |rule: &&Rule| rule.colour == palette::TOUCH;
         let rules = self.rules.iter().filter(|rule| (self.x.0..=self.x.1).contains(&rule.x));
-        for rule in rules.clone() {
-            let ends = [(rule.x, y.0), (rule.x, y.1)];
-            chart.draw_series([PathElement::new(ends, rule.colour.stroke_width(3))])?;
+        let (touches, faces): (Vec<&Rule>, Vec<&Rule>) = rules.partition(is_touch);
+        let mut place = |rule: &Rule| {
+            let (x, width) = (x_at(rule.x), width(&rule.name, RULE_PX));
+            let is_left = is_touch(&rule) || x + width > wide;
+            let (at, side) = if is_left { (x - 2.0, "end") } else { (x + 2.0, "start") };
+            let from = if is_left { at - width } else { at };
+            let is_free = taken.iter().all(|other| from >= other.1 || from + width <= other.0);
+            is_free.then(|| {
+                taken.push((from, from + width));
+                (at, side)
+            })
+        };
+        let all = faces.into_iter().chain(touches);
+        all.filter_map(|rule| place(rule).map(|(at, side)| (at, side, rule))).collect()
+    }
+
+    /// Everything with a place on both axes, in their units, for a plot that is `across` CSS pixels wide.
+    fn data(&self, across: f64) -> String {
+        let (x, y) = (self.x, self.y_range());
+        // Beyond both ends, so that it reaches them after every zoom.
+        let (tall, long) = (10.0 * (y.1 - y.0), 10.0 * (x.1 - x.0));
+        let path = |class: &str, name: &str, stroke: &str, d: &str| {
+            let name = escape(name);
+            format!("<path class=\"{class}\" data-name=\"{name}\" {stroke} d=\"{d}\"/>\n")
+        };
+        let mut svg = String::new();
+        let rect = |class: &str,
+                    colour: RGBColor,
+                    (from, to): (f64, f64),
+                    (low, high): (f64, f64)| {
+            format!(
+                "<rect class=\"{class}\" fill=\"{}\" x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\"",
+                hex(colour),
+                digits(from, x),
+                low,
+                digits(to - from, x).max(0.0),
+                high - low
+            )
+        };
+        for &span in &self.shades {
+            svg += &rect("shade", palette::SHADE, span, (y.0 - tall, y.1 + tall));
+            svg += "/>\n";
         }
-        // Two CSS pixels: the lowest and highest values of a column stay.
-        let columns = (wide as i32 - LEFT - RIGHT).max(1) as usize / 4;
+        for (place, (_, stretches)) in self.bands.iter().enumerate() {
+            let low = -0.92 - place as f64;
+            for Stretch { from, to, name, colour } in stretches {
+                svg += &rect("band", *colour, (*from, *to), (low, low + 0.84));
+                svg += &format!(" data-name=\"{}\"/>\n", escape(name));
+            }
+        }
+        for &(name, look, level) in &self.levels {
+            let d = format!("M{} {level}H{}", x.0 - long, x.1 + long);
+            svg += &path("level", name, &look.stroke(), &d);
+        }
+        for Rule { x: at, name, colour } in &self.rules {
+            let d = format!("M{} {}V{}", digits(*at, x), y.0 - tall, y.1 + tall);
+            svg += &path("rule", name, &stroke(*colour, 1.5), &d);
+        }
+        let point = |&(a, b): &(f64, f64)| format!("{} {}", digits(a, x), digits(b, y));
         let mut lines: Vec<&Line> = self.lines.iter().collect();
         lines.sort_by_key(|line| line.look.style().0);
-        for line in lines {
-            for piece in decimate(&line.points, self.x, y, columns) {
-                chart.draw_series([PathElement::new(piece, line.look.style().1)])?;
+        for Line { name, look, points } in lines {
+            // Two CSS pixels: the lowest and highest values of a column stay.
+            let pieces = decimate(points, x, (across / 2.0).max(1.0) as usize);
+            let piece = |piece: Vec<(f64, f64)>| {
+                // Of a level stretch both ends.
+                let same = |a: usize, b: usize| {
+                    piece
+                        .get(a)
+                        .zip(piece.get(b))
+                        .is_some_and(|(a, b)| digits(a.1, y) == digits(b.1, y))
+                };
+                let kept = |i: &usize| *i == 0 || !(same(i - 1, *i) && same(*i, i + 1));
+                let kept = (0..piece.len()).filter(kept).map(|i| point(&piece[i]));
+                format!("M{}", kept.collect::<Vec<_>>().join(" "))
+            };
+            let d: String = pieces.into_iter().map(piece).collect();
+            let class = if *look == Look::Truth { "line truth" } else { "line" };
+            svg += &path(class, name, &look.stroke(), &d);
+        }
+        for Marks { name, shape, colour, points } in &self.marks {
+            let points = points.iter().filter(|point| point.0.is_finite() && point.1.is_finite());
+            let d: String = points.map(|at| format!("M{}h0", point(at))).collect();
+            for (class, cap, width) in shape.strokes() {
+                let colour = if *class == "rim" { "white".to_owned() } else { hex(*colour) };
+                let stroke = format!(
+                    "stroke=\"{colour}\" stroke-width=\"{width}\" stroke-linecap=\"{cap}\""
+                );
+                svg += &path(class, name, &stroke, &d);
             }
         }
-        for marks in &self.marks {
-            let shown = marks.points.iter().filter(|point| inside(**point, self.x, y));
-            for &point in shown {
-                let [rim, body] = mark(marks, (marks.shift, 0));
-                chart.draw_series([EmptyElement::at(point) + rim + body])?;
-            }
-        }
-        let to_pixel = |x: f64| {
-            let part = (x - self.x.0) / (self.x.1 - self.x.0);
-            LEFT + (part * f64::from(wide as i32 - LEFT - RIGHT)).round() as i32
-        };
-        // Touches before faces; a name that would be on another one is left out.
-        let mut taken: Vec<(i32, i32)> = Vec::new();
-        let is_touch = |rule: &&Rule| rule.colour == palette::TOUCH;
-        let (touches, faces): (Vec<&Rule>, Vec<&Rule>) = rules.partition(is_touch);
-        for rule in touches.into_iter().chain(faces) {
-            let (x, width) = (to_pixel(rule.x), text_width(&rule.name, RULE_PX));
-            let is_left = is_touch(&rule) || x + width > wide as i32;
-            let (at, side) = if is_left { (x - 4, HPos::Right) } else { (x + 4, HPos::Left) };
-            let from = if is_left { at - width } else { at };
-            if taken.iter().all(|other| from >= other.1 || from + width <= other.0) {
-                let style = font(RULE_PX, rule.colour, side, VPos::Center);
-                body.draw(&Text::new(&*rule.name, (at, RULES / 2), style))?;
-                taken.push((from, from + width));
-            }
-        }
-        Ok(())
+        svg
     }
 
-    /// Vertical range of all that is shown.
+    /// Vertical range of all that is shown. It begins at zero where that hides nothing.
     fn y_range(&self) -> (f64, f64) {
         if let Some(range) = self.y {
             return range;
         }
-        let points = self.lines.iter().flat_map(|line| &line.points);
-        let marks = self.marks.iter().flat_map(|marks| &marks.points);
-        let shown = points.chain(marks).filter(|point| point.0 >= self.x.0 && point.0 <= self.x.1);
+        if !self.bands.is_empty() {
+            return (-(self.bands.len() as f64), 0.0);
+        }
+        let shown = self.points().filter(|point| point.0 >= self.x.0 && point.0 <= self.x.1);
         let levels = self.levels.iter().map(|level| level.2);
         let range = axis::extent(shown.map(|point| point.1).chain(levels)).unwrap_or((0.0, 1.0));
         let missing = (0.5 * (self.least_span - (range.1 - range.0))).max(0.0);
-        axis::padded((range.0 - missing, range.1 + missing), 0.06)
+        let (low, high) = axis::padded((range.0 - missing, range.1 + missing), 0.06);
+        let near_zero = (-0.02 * range.1..0.3 * range.1).contains(&range.0);
+        (if near_zero { 0.0 } else { low }, high)
+    }
+
+    fn points(&self) -> impl Iterator<Item = &(f64, f64)> {
+        let lines = self.lines.iter().flat_map(|line| &line.points);
+        lines.chain(self.marks.iter().flat_map(|marks| &marks.points))
     }
 
     /// Whether something is drawn.
     pub(crate) fn has_data(&self) -> bool {
-        let points = self.lines.iter().flat_map(|line| &line.points);
-        let marks = self.marks.iter().flat_map(|marks| &marks.points);
-        points.chain(marks).any(|point| point.1.is_finite())
+        !self.bands.is_empty() || self.points().any(|point| point.1.is_finite())
     }
 
     /// Everything that the legend names, in its order: what has a point in the plot.
-    fn legend(&self) -> Vec<(&str, Sample<'_>)> {
-        let y = self.y_range();
-        let has_points =
-            |points: &[(f64, f64)]| points.iter().any(|point| inside(*point, self.x, y));
-        let lines = self.lines.iter().filter(|line| has_points(&line.points));
-        let lines = lines.map(|line| (&*line.name, Sample::Line(line.look)));
+    fn legend(&self) -> Vec<Sample<'_>> {
+        let (x, y) = (self.x, self.y_range());
+        let is_inside =
+            |point: &(f64, f64)| (x.0..=x.1).contains(&point.0) && (y.0..=y.1).contains(&point.1);
+        let lines = self.lines.iter().filter(|line| line.points.iter().any(is_inside));
+        let sample = |name, look, has_value| Sample { name, look, mark: None, has_value };
+        let lines = lines.map(|line| sample(&*line.name, line.look, true));
         let levels = self.levels.iter().filter(|level| (y.0..=y.1).contains(&level.2));
-        let levels = levels.map(|&(name, look, _)| (name, Sample::Line(look)));
-        let marks = self.marks.iter().filter(|marks| has_points(&marks.points));
-        let marks = marks.map(|marks| (&*marks.name, Sample::Mark(marks)));
-        lines.chain(levels).chain(marks).collect()
+        let levels = levels.map(|&(name, look, _)| sample(name, look, false));
+        let bands = self.bands.iter().map(|&(name, _)| sample(name, Look::Truth, true));
+        let marks = self.marks.iter().filter(|marks| marks.points.iter().any(is_inside));
+        let marks = marks.map(|marks| Sample {
+            name: &marks.name,
+            look: Look::Other(marks.colour),
+            mark: Some(marks.shape),
+            has_value: false,
+        });
+        lines.chain(levels).chain(bands).chain(marks).collect()
     }
 
-    /// One row, or two where title and legend do not fit side by side.
-    fn head_height(&self, wide: i32) -> i32 {
-        let legend: i32 = self.legend().iter().map(Sample::width).sum();
-        let title = text_width(&self.title, TITLE_PX);
-        let fits = title + legend + RIGHT + 24 * S <= wide;
-        if fits { HEAD } else { HEAD + LEGEND }
-    }
-
-    /// Title on the left, legend behind it or below: a narrow screen shows the left end first.
-    fn draw_head(&self, head: &Area) -> Drawn {
-        let high = head.dim_in_pixel().1;
-        let style = font(TITLE_PX, palette::TRUTH, HPos::Left, VPos::Center);
-        head.draw(&Text::new(self.title.clone(), (8 * S, HEAD / 2), style))?;
-        let middle = if high as i32 > HEAD { HEAD - 4 * S + LEGEND / 2 } else { HEAD / 2 };
+    /// Title and legend, in one row, or in two where they do not fit side by side, and their height.
+    fn head(&self, wide: f64) -> (String, f64) {
         let legend = self.legend();
-        let behind = if high as i32 > HEAD { 0 } else { text_width(&self.title, TITLE_PX) };
-        let mut right = 8 * S + behind + legend.iter().map(Sample::width).sum::<i32>();
-        for entry in legend.iter().rev() {
-            let (name, sample) = entry;
-            let style = font(TEXT_PX, palette::TEXT, HPos::Left, VPos::Center);
-            let text = right - text_width(name, TEXT_PX);
-            head.draw(&Text::new(*name, (text, middle), style))?;
-            match sample {
-                Sample::Line(look) => {
-                    let ends = [(text - 32 * S, middle), (text - 6 * S, middle)];
-                    head.draw(&PathElement::new(ends, look.style().1))?;
-                }
-                Sample::Mark(marks) => {
-                    for part in mark(marks, (text - 13 * S, middle)) {
-                        head.draw(&part)?;
-                    }
-                }
-            }
-            right -= Sample::width(entry);
+        let title = 8.0 + width(&self.title, TITLE_PX);
+        let fits = title + legend.iter().map(Sample::width).sum::<f64>() + RIGHT <= wide;
+        let (mut left, middle, high) = match fits {
+            true => (title, 0.5 * HEAD, HEAD),
+            false => (8.0, HEAD - 4.0 + 0.5 * LEGEND, HEAD + LEGEND),
+        };
+        let mut svg = format!(
+            "<g font-family=\"sans-serif\" font-size=\"{TEXT_PX}\" fill=\"#374151\">\n\
+<text x=\"8\" y=\"{}\" font-size=\"{TITLE_PX}\" fill=\"#1f2937\">{}</text>\n",
+            0.5 * HEAD + 5.0,
+            escape(&self.title)
+        );
+        for sample in legend {
+            svg += &format!(
+                "<g transform=\"translate({left:.1} {middle})\">{}<text x=\"38\" y=\"4\">{}</text></g>\n",
+                sample.strokes(25.0, 12.0),
+                escape(sample.name)
+            );
+            left += sample.width();
         }
-        Ok(())
+        (svg + "</g>\n", high)
     }
 }
 
-/// What is before a name in the legend.
-enum Sample<'a> {
-    Line(Look),
-    Mark(&'a Marks),
+/// An entry of a legend.
+struct Sample<'a> {
+    name: &'a str,
+    look: Look,
+    mark: Option<Shape>,
+    /// It has a value at the cursor.
+    has_value: bool,
 }
 
 impl Sample<'_> {
-    /// Width of an entry of the legend with the room before it, in drawing units.
-    fn width((name, sample): &(&str, Self)) -> i32 {
-        let room = match sample {
-            Self::Line(_) => 44 * S,
-            Self::Mark(_) => 34 * S,
-        };
-        room + text_width(name, TEXT_PX)
+    /// Width of the entry with the room before it, CSS pixels.
+    fn width(&self) -> f64 {
+        44.0 + width(self.name, TEXT_PX)
     }
-}
 
-/// One mark with a white rim at `at`.
-fn mark<'a>(marks: &Marks, at: (i32, i32)) -> [DynElement<'static, SVGBackend<'a>, (i32, i32)>; 2] {
-    const R: i32 = 5 * S;
-    match marks.shape {
-        Shape::Dot => [
-            Circle::new(at, R + 2, WHITE.filled()).into_dyn(),
-            Circle::new(at, R, marks.colour.filled()).into_dyn(),
-        ],
-        Shape::Ring => [
-            Circle::new(at, R - 1, WHITE.filled()).into_dyn(),
-            Circle::new(at, R - 1, marks.colour.stroke_width(4)).into_dyn(),
-        ],
-        Shape::Triangle => [
-            TriangleMarker::new(at, R + 4, WHITE.filled()).into_dyn(),
-            TriangleMarker::new(at, R + 1, marks.colour.filled()).into_dyn(),
-        ],
+    /// The line of this length, or the mark at the place `left + length / 2`.
+    fn strokes(&self, length: f64, left: f64) -> String {
+        let Some(shape) = self.mark else {
+            let class = if self.look == Look::Truth { " class=\"truth\"" } else { "" };
+            return format!("<path{class} {} d=\"M{left} 0h{length}\"/>", self.look.stroke());
+        };
+        let one = |&(class, cap, width): &(&str, &str, f64)| {
+            let colour = if class == "rim" { "white".to_owned() } else { hex(self.look.style().1) };
+            format!(
+                "<path class=\"{class}\" stroke=\"{colour}\" stroke-width=\"{width}\" stroke-linecap=\"{cap}\" d=\"M{} 0h0\"/>",
+                left + 0.5 * length
+            )
+        };
+        shape.strokes().iter().map(one).collect()
+    }
+
+    /// The entry as text of a page, with room for the value at the cursor.
+    fn html(&self) -> String {
+        let (name, value) = (escape(self.name), if self.has_value { "<b></b>" } else { "" });
+        format!(
+            "<span data-name=\"{name}\"><svg width=\"26\" height=\"16\" viewBox=\"0 -8 26 16\" \
+aria-hidden=\"true\">{}</svg>{name}{value}</span>",
+            self.strokes(24.0, 1.0)
+        )
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::svg;
 
     #[test]
-    fn the_frame_is_where_the_plot_is() {
-        let x = (10.0, 20.0);
-        let corners = vec![(10.0, 1.0), (20.0, 5.0)];
-        for rules in
-            [vec![], vec![Rule { x: 12.0, name: "step 1".to_owned(), colour: palette::FACE }]]
-        {
-            let panel = Panel {
-                title: "t".to_owned(),
-                y_name: "y, mm",
-                x_name: Some("x, s"),
-                x,
-                y: Some((1.0, 5.0)),
-                least_span: 0.0,
-                lines: vec![Line { name: "a".into(), look: Look::Truth, points: corners.clone() }],
-                marks: Vec::new(),
-                levels: Vec::new(),
-                shades: Vec::new(),
-                rules,
-            };
-            let [left, right, top, bottom] = panel.frame((540, 250));
-            let svg = svg::fluid((540, 250), "", |area| panel.draw(area));
-            let line =
-                svg.rsplit("<polyline").find(|line| line.contains("stroke=\"#1F2937\"")).unwrap();
-            let points = line.split("points=\"").nth(1).unwrap().split('"').next().unwrap();
-            let mut ends = points.split_whitespace().map(|point| {
-                let (x, y) = point.split_once(',').unwrap();
-                (x.parse::<i32>().unwrap(), y.parse::<i32>().unwrap())
-            });
-            let (first, last) = (ends.next().unwrap(), ends.next_back().unwrap());
-            let near = |a: i32, b: i32| (a - b).abs() <= 3;
-            assert!(near(first.0, left) && near(first.1, bottom), "{first:?} {left} {bottom}");
-            assert!(near(last.0, right) && near(last.1, top), "{last:?} {right} {top}");
-        }
+    fn the_data_of_a_plot_are_in_its_units_and_its_picture_shows_their_range() {
+        let panel = Panel {
+            title: "t".to_owned(),
+            y_name: "y, mm",
+            x_name: Some("x, s"),
+            x: (10.0, 20.0),
+            y: Some((1.0, 5.0)),
+            lines: vec![Line {
+                name: "a".into(),
+                look: Look::Truth,
+                points: vec![(10.0, 1.0), (15.0, f64::NAN), (20.0, 5.00004)],
+            }],
+            ..Panel::default()
+        };
+        let html = panel.figure("", (540, 250), "name");
+        assert!(html.contains("viewBox=\"10 -5 10 4\""), "{html}");
+        assert!(html.contains("d=\"M10 1M20 5\""), "{html}");
+        assert!(html.contains("data-x=\"10 20\" data-y=\"1 5\""), "{html}");
+        assert!(stacked((540, 250), &mut [panel]).contains("d=\"M10 1M20 5\""));
+    }
+
+    #[test]
+    fn an_axis_begins_at_zero_where_that_hides_nothing() {
+        let range = |points: [(f64, f64); 2]| {
+            let line = Line { name: "a".into(), look: Look::Truth, points: points.to_vec() };
+            Panel { x: (0.0, 1.0), lines: vec![line], ..Panel::default() }.y_range()
+        };
+        assert_eq!(range([(0.0, -0.01), (1.0, 30.0)]).0, 0.0);
+        assert_eq!(range([(0.0, 8.0), (1.0, 30.0)]).0, 0.0);
+        assert!(range([(0.0, 20.0), (1.0, 30.0)]).0 > 19.0);
+        assert!(range([(0.0, -5.0), (1.0, 30.0)]).0 < -5.0);
     }
 }

@@ -5,11 +5,7 @@ use plotters::style::RGBColor;
 use super::axis;
 use super::palette;
 use super::panel::{Line, Look, Marks, Panel, Rule, Shape, stacked};
-use super::svg;
 use crate::record::{CrossingLine, Recording, Report, Tick};
-
-/// From one mark of a crossing to the next, drawing units.
-const SIDE: i32 = 22;
 
 /// Largest part of the time axis before the first motion.
 const BEFORE_MOTION: f64 = 0.12;
@@ -153,7 +149,7 @@ impl<'a> View<'a> {
     fn marks(
         &self,
         name: &'static str,
-        (shape, colour, shift): (Shape, RGBColor, i32),
+        (shape, colour): (Shape, RGBColor),
         of: impl Fn(&CrossingLine) -> Option<f64>,
     ) -> Marks {
         let crossings = &self.recording.summary.crossings;
@@ -162,7 +158,6 @@ impl<'a> View<'a> {
             name: name.into(),
             shape,
             colour,
-            shift,
             points: crossings.iter().filter_map(at).collect(),
         }
     }
@@ -176,6 +171,8 @@ impl<'a> View<'a> {
             self.radius(),
             self.slip_margin(),
             self.compression(),
+            self.duty(),
+            super::band::panel(self),
         ]
     }
 
@@ -201,36 +198,39 @@ impl<'a> View<'a> {
             self.line("true", Look::Truth, |row| row.of_truth(|t| t.preload_true_n)),
         ];
         panel.levels = self.limit_n.iter().map(|&n| ("limit", Look::Limit, n)).collect();
-        // The build-up at rest would take most of the height.
-        let moving = motion(self.rows).map_or(f64::NEG_INFINITY, |row| self.across.of(row));
-        if self.across == Across::Time {
-            let shown = panel.lines.iter().flat_map(|line| &line.points);
-            let shown = shown.filter(|point| point.0 >= moving).map(|point| point.1);
-            let levels = panel.levels.iter().map(|level| level.2);
-            panel.y = axis::extent(shown.chain(levels)).map(|range| axis::padded(range, 0.06));
-        }
         panel
     }
 
+    /// The clearance as a part of the reference gap; in mm where there is none.
     pub(super) fn gap(&self) -> Panel {
         let summary = &self.recording.summary;
-        let mut panel = self.panel("Clearance at the step root, and the gap", "clearance, mm");
-        panel.lines =
-            vec![self.line("clearance", Look::Truth, |row| row.of_truth(|t| t.root_clearance_mm))];
-        panel.marks = vec![
-            self.marks("predicted", (Shape::Triangle, palette::FLOOR, -SIDE), |c| {
-                c.gap_predicted_mm
-            }),
-            self.marks("true gap", (Shape::Dot, palette::TRUTH, 0), |c| Some(c.gap_mm)),
-            self.marks("measured", (Shape::Ring, palette::GAP, SIDE), |c| c.gap_measured_mm),
+        let reference_mm = Some(summary.gap_ref_mm).filter(|gap| *gap > 0.0);
+        let (one, y_name) = match reference_mm {
+            Some(gap) => (gap / 100.0, "gap, % of reference"),
+            None => (1.0, "gap, mm"),
+        };
+        let mut panel = self.panel("Clearance at the step root, and the gap", y_name);
+        panel.also = reference_mm.map(|_| (one, "mm"));
+        panel.lines = vec![
+            self.line("clearance", Look::Truth, |row| row.of_truth(|t| t.root_clearance_mm) / one),
         ];
-        if summary.gap_ref_mm > 0.0 {
-            panel.levels = vec![("reference gap", Look::Limit, summary.gap_ref_mm)];
-        }
+        panel.marks = vec![
+            self.marks("predicted", (Shape::Square, palette::FLOOR), |c| {
+                Some(c.gap_predicted_mm? / one)
+            }),
+            self.marks("measured", (Shape::Ring, palette::GAP), |c| Some(c.gap_measured_mm? / one)),
+            self.marks("true gap", (Shape::Dot, palette::TRUTH), |c| Some(c.gap_mm / one)),
+        ];
+        panel.levels =
+            reference_mm.map(|_| ("reference gap", Look::Limit, 100.0)).into_iter().collect();
         // The clearance before touch and after the climb is unrelated to the gap.
         let gaps = panel.marks.iter().flat_map(|marks| &marks.points).map(|point| point.1);
-        let shown = gaps.chain([summary.gap_ref_mm, summary.max_gap_mm]).filter(|&gap| gap > 0.0);
-        panel.y = axis::extent(shown).map(|range| (0.7 * range.0, 1.25 * range.1));
+        let shown = gaps.chain(reference_mm.map(|_| 100.0)).filter(|&gap| gap > 0.0);
+        let range = axis::extent(shown);
+        panel.y = range.map(|(low, high)| {
+            let room = (0.15 * (high - low)).max(0.01 * high);
+            (low - room, high + 1.5 * room)
+        });
         panel
     }
 
@@ -246,7 +246,7 @@ impl<'a> View<'a> {
     }
 
     pub(super) fn slip_margin(&self) -> Panel {
-        let mut panel = self.panel("Slip margin", "unused friction, ratio");
+        let mut panel = self.panel("Slip margin", "unused, ratio");
         panel.least_span = 0.2;
         panel.lines = vec![
             self.line("by the model", Look::Estimate(palette::SLIP), |row| {
@@ -266,6 +266,19 @@ impl<'a> View<'a> {
                 row.controller.compression_mm
             }),
             self.line("true", Look::Truth, |row| row.of_truth(|t| t.compression_true_mm)),
+        ];
+        panel
+    }
+
+    /// What the motors are told.
+    fn duty(&self) -> Panel {
+        let mut panel = self.panel("Duty of the motors", "duty, of full");
+        panel.least_span = 0.1;
+        panel.lines = vec![
+            self.line("drive", Look::Measured(palette::SPEED), |row| row.controller.drive_duty),
+            self.line("pre-tightener", Look::Measured(palette::PRELOAD), |row| {
+                row.controller.pretightener_duty
+            }),
         ];
         panel
     }
@@ -318,26 +331,10 @@ pub(super) fn parameter(parameters: &str, section: &str, name: &str) -> Option<f
     value.as_float().or_else(|| value.as_integer().map(|n| n as f64))
 }
 
-/// A plot, with what the script needs to place its cursor.
+/// A plot, with what the script needs to place its cursor: axis, and time at its zero.
 pub(super) fn figure(panel: &Panel, across: Across, size: (u32, u32), name: &str) -> String {
-    let frame = attributes(panel.x, across, panel.frame(size));
-    format!("<figure {frame}>{}</figure>\n", svg::fluid(size, name, |area| panel.draw(area)))
-}
-
-/// Axis, time at its zero, its range, and the place of the plot in the picture: left, right, top
-/// and bottom.
-pub(super) fn attributes(
-    x: (f64, f64),
-    across: Across,
-    [left, right, top, bottom]: [i32; 4],
-) -> String {
-    format!(
-        "data-across=\"{}\" data-since=\"{}\" data-frame=\"{} {} {left} {right} {top} {bottom}\"",
-        across.axis(),
-        across.since_s(),
-        x.0,
-        x.1
-    )
+    let axis = format!("data-across=\"{}\" data-since=\"{}\"", across.axis(), across.since_s());
+    panel.figure(&axis, size, name)
 }
 
 #[cfg(test)]

@@ -45,6 +45,20 @@ function pose(scene, row) {
   };
 }
 
+// The pressure along a surface, as the outline of an area in mm² a tenth of the force in N: spread over
+// the points of the surface as deep as they are within the undeformed wheel.
+function pressure(centre, radius, surface, force) {
+  const depths = surface.map((point) => Math.max(0, radius - Math.hypot(point[0] - centre[0], point[1] - centre[1])));
+  const area = depths.slice(1).reduce((sum, depth, i) =>
+    sum + depth * Math.hypot(surface[i + 1][0] - surface[i][0], surface[i + 1][1] - surface[i][1]), 0);
+  if (!(force > 0.2 && area > 0)) return [];
+  const tips = surface.map((point, i) => {
+    const away = Math.hypot(point[0] - centre[0], point[1] - centre[1]);
+    return [0, 1].map((k) => point[k] + (point[k] - centre[k]) / away * depths[i] * 0.1 * force / area);
+  });
+  return surface.concat(tips.reverse());
+}
+
 // The crossing that an instant belongs to: the one under way, or the next.
 function current(scene, t) {
   return scene.crossings.find((c, i) => {
@@ -143,6 +157,7 @@ function start(scene) {
       $("gaptext").textContent = `clearance ${gap.toFixed(2)} mm`;
       label("gaptext", Math.min(p.root[0] + 6, p.x + 45 - 11 * small), p.edge[1] + 1.2, "start", small);
     }
+    inset(row, p, gap);
     const c = scene.retracts ? null : current(scene, now);
     const touch = c && c.face_mm - c.touch_mm;
     set("touchline", { d: c ? `M${touch},${-(p.floor - 6)}V${-(p.floor + 4)}` : "" });
@@ -161,36 +176,33 @@ function start(scene) {
 
     $("phase").textContent = phase(scene, row);
     $("scrub").value = now;
-    for (const figure of document.querySelectorAll("figure[data-across]")) cursor(figure, row);
+    plots.show(now);
   }
 
-  // The cursor of one plot.
-  function cursor(figure, row) {
-    const [low, high, left, right, top, bottom] = figure.dataset.frame.split(" ").map(Number);
-    const value = figure.dataset.across === "position" ? row.position_mm : row.t_s - Number(figure.dataset.since);
-    let line = figure.querySelector(".cursor");
-    if (!line) {
-      line = document.createElementNS("http://www.w3.org/2000/svg", "line");
-      line.setAttribute("class", "cursor");
-      figure.querySelector("svg").append(line);
-      figure.addEventListener("click", (event) => pick(figure, event));
-    }
-    const x = left + (value - low) / (high - low) * (right - left);
-    line.style.display = x >= left && x <= right ? "" : "none";
-    for (const [name, at] of [["x1", x], ["x2", x], ["y1", top], ["y2", bottom]]) line.setAttribute(name, at);
+  // The corner of one step: what the rubber fills, what presses, and the gap beside its reference.
+  function inset(row, p, gap) {
+    const next = current(scene, now) || scene.crossings[scene.crossings.length - 1];
+    const at = next ? next.face_mm : p.edge ? p.edge[0] : p.x, upper = wallAt(g, at), lower = upper - (next ? next.step_mm : 0);
+    const size = near.width / 5, small = 12.5 * size / ($("inset").clientWidth || 500);
+    set("inset", { viewBox: `${at - 0.62 * size} ${-(lower + 0.62 * size)} ${size} ${size}` });
+    const path = (points) => (points.length ? `M${points.map(([x, y]) => `${x},${-y}`).join("L")}Z` : "");
+    const along = (from, to) => [...Array(41).keys()].map((i) => [0, 1].map((k) => from[k] + (to[k] - from[k]) * i / 40));
+    const floor = along([Math.min(p.x - 8, at), p.floor], [p.x < at ? Math.min(p.x + 8, at) : p.x + 8, p.floor]);
+    const corner = along([at, lower], [at, upper]).concat(along([at, upper], [at + 6, upper]));
+    set("wallpressure", { d: path(pressure([p.x, p.y], r, floor, row.floor_force_n)) });
+    set("cornerpressure", { d: p.x < at ? path(pressure([p.x, p.y], r, corner, row.corner_force_n)) : "" });
+    const reference = scene.gap_ref_mm || 0;
+    set("reference", { d: `M${at - reference},${-lower}A${reference},${reference} 0 0 1 ${at},${-(lower + reference)}` });
+    label("referencetext", at - reference, lower - 1.4 * small, "end", small);
+    $("referencetext").style.display = reference > 0 ? "" : "none";
+    set("insetoutline", { r, cx: p.x, cy: -p.y });
+    set("insetgap", { d: gap === null ? "" : $("gapline").getAttribute("d") });
+    $("insettext").textContent = gap === null ? "" : `${gap.toFixed(2)} mm`;
+    label("insettext", at + 0.4, lower + 0.4, "start", small);
   }
 
-  // A click in a plot goes to its instant.
-  function pick(figure, event) {
-    const [low, high, left, right] = figure.dataset.frame.split(" ").map(Number);
-    const svg = figure.querySelector("svg"), box = svg.getBoundingClientRect();
-    const x = (event.clientX - box.left) / box.width * svg.viewBox.baseVal.width;
-    const value = low + (x - left) / (right - left) * (high - low);
-    let t = value + Number(figure.dataset.since);
-    if (figure.dataset.across === "position") {
-      const away = (row) => (row[1] === null ? Infinity : Math.abs(row[1] - value));
-      t = scene.rows.reduce((a, b) => (away(b) < away(a) ? b : a))[0];
-    }
+  // A pick in a plot goes to its instant.
+  function pick(t) {
     if (t < from || t > to) { $("choice").value = "run"; choose(); }
     now = Math.min(to, Math.max(from, t));
     draw();
@@ -227,6 +239,7 @@ function start(scene) {
   $("scrub").addEventListener("input", () => { now = Number($("scrub").value); draw(); });
   $("play").addEventListener("click", play);
   addEventListener("resize", draw);
+  plots.onPick(pick);
   $("stage").hidden = false;
   choose();
 }

@@ -2,12 +2,10 @@
 //! run's own rows, thinned.
 
 use interstage::rig::Rig;
-use interstage::units::Direction;
 use serde::Serialize;
 use serde_json::{Map, Value};
 
 use crate::record::{CrossingLine, Recording, Tick};
-use crate::rollout::{CrossingSetup, Wheel};
 use crate::scenario::Scenario;
 
 /// Rows kept of a crossing's surroundings, at most.
@@ -148,13 +146,10 @@ pub(super) struct Event {
     pub(super) touch_rigid_mm: f64,
     /// Compression of the tread at the first touch, mm.
     pub(super) compression_mm: f64,
-    /// Speed and preload at the instant of the gap, mm/s and N.
-    pub(super) speed_mm_s: f64,
+    /// Preload at the instant of the gap, N.
     pub(super) preload_n: f64,
     /// Gap, mm: true, or measured where there is no truth.
     pub(super) gap_mm: f64,
-    /// Gap at that speed with the preload of the smooth wall, by the model, mm.
-    pub(super) gap_at_cruise_mm: f64,
 }
 
 impl Scene {
@@ -169,11 +164,7 @@ impl Scene {
         let drawn = if measured { Map::new() } else { summary.drawn.clone() };
         let geometry = Geometry::new(&scenario.rig, &drawn);
         let retracts = summary.direction == "retract";
-        let direction = if retracts { Direction::Retract } else { Direction::Deploy };
-        let wheel = Wheel::try_build(&scenario.rig).ok()?;
-        let load_n = Some(load_n(&scenario.rig));
-        let setup = CrossingSetup { speed_mm_s: 0.0, preload_n: 0.0, direction, load_n };
-        let event = |line: &CrossingLine| event(&geometry, &rows, line, (&wheel, setup));
+        let event = |line: &CrossingLine| event(&geometry, &rows, line);
         let crossings: Vec<Event> = summary.crossings.iter().map(event).collect();
         let rows = thinned(&rows, &crossings);
         let rows = rows.into_iter().map(|row| values(&geometry, row)).collect();
@@ -188,29 +179,11 @@ impl Scene {
     }
 }
 
-/// Axial load on the wheel, N.
-fn load_n(rig: &Rig) -> f64 {
-    rig.plant.top_load_n * rig.plant.top_load_share
-}
-
-fn event(
-    geometry: &Geometry,
-    rows: &[&Tick],
-    line: &CrossingLine,
-    (wheel, setup): (&Wheel, CrossingSetup),
-) -> Event {
+fn event(geometry: &Geometry, rows: &[&Tick], line: &CrossingLine) -> Event {
     let at = rows.partition_point(|row| row.controller.t_s < line.touch_s).min(rows.len() - 1);
     let compression_mm = compression_mm(rows[at]);
     let gap_mm = if line.gap_mm.is_finite() { Some(line.gap_mm) } else { line.gap_measured_mm };
     let gap_mm = gap_mm.unwrap_or(f64::NAN);
-    // The model is held to the run's own gap; then the preload above the smooth wall's is taken
-    // away.
-    let setup = CrossingSetup { speed_mm_s: line.speed_mm_s, ..setup };
-    let known = gap_mm.is_finite().then(|| wheel.force_n(gap_mm, &setup));
-    let at_cruise = known.and_then(|force_n| {
-        let preload_n = force_n - (line.preload_n - geometry.cruise_n);
-        wheel.cross(&CrossingSetup { preload_n, ..setup })
-    });
     let step_mm = geometry.step_mm(line.step_mm);
     Event {
         index: line.index,
@@ -221,10 +194,8 @@ fn event(
         touch_mm: line.step_mm - rows[at].position_mm(),
         touch_rigid_mm: geometry.touch_mm(step_mm, 0.0),
         compression_mm,
-        speed_mm_s: line.speed_mm_s,
         preload_n: line.preload_n,
         gap_mm,
-        gap_at_cruise_mm: at_cruise.map_or(f64::NAN, |crossed| crossed.gap_mm),
     }
 }
 
@@ -350,16 +321,6 @@ mod tests {
             let touch = scene.geometry.touch_mm(crossing.step_mm, crossing.compression_mm);
             assert!((crossing.touch_mm - touch).abs() < 0.1, "{crossing:?} {touch}");
             assert!(crossing.touch_mm > crossing.touch_rigid_mm, "compression touches earlier");
-        }
-    }
-
-    #[test]
-    fn less_preload_would_leave_a_larger_gap() {
-        for crossing in &Scene::new(&example::deploy()).unwrap().crossings {
-            // To the first step the preload is still being built up.
-            let more = crossing.preload_n > 33.3;
-            assert_eq!(crossing.gap_at_cruise_mm > crossing.gap_mm, more, "{crossing:?}");
-            assert!(crossing.gap_at_cruise_mm < 3.44, "the free wheel's gap is the largest");
         }
     }
 

@@ -28,8 +28,8 @@ fn the_page_of_a_long_log_is_small_too() {
 fn the_page_shows_every_plot_and_figure() {
     let recording = example::deploy();
     let page = html(&recording, &[]);
-    // Six plots and the bands on two axes, six plots for each of three crossings.
-    assert_eq!(page.matches("<figure data-across").count(), 2 * 7 + 3 * 6);
+    // Seven plots and the bands on two axes, six plots for each of three crossings.
+    assert_eq!(page.matches("<figure data-across").count(), 2 * 8 + 3 * 6);
     for text in ["3 crossings", "worst gap", "tau_s = 0.1059", env!("CARGO_PKG_VERSION")] {
         assert!(page.to_lowercase().contains(&text.to_lowercase()), "{text}");
     }
@@ -92,11 +92,46 @@ fn the_times_of_a_page_count_from_the_command() {
 fn faults_limits_and_steps_are_marked_and_other_parameters_listed() {
     let mut recording = example::faulted();
     let page = html(&recording, &[]);
-    let is_marked = |page: &str, mark: &str| page.contains(&format!("\n{mark}\n</text>"));
+    let is_marked = |page: &str, mark: &str| page.contains(&format!(">{mark}</text>"));
     assert!(is_marked(&page, "121") && is_marked(&page, "201"));
     assert!(is_marked(&html(&example::deploy(), &[]), "step 1"));
     assert!(page.contains("Every parameter is the preset's"));
     recording.summary.overrides.insert("tread.tau_s".to_owned(), 0.2.into());
     let page = html(&recording, &[]);
     assert!(page.contains("<td>tread.tau_s</td><td>0.2</td>"));
+}
+
+/// What the script shows at the cursor it reads off these paths.
+#[test]
+fn a_plot_has_the_run_s_own_values_and_a_place_for_each() {
+    let recording = example::deploy();
+    let page = html(&recording, &[]);
+    let zero_s = recording.summary.commanded_s.expect("a command");
+    let figures: Vec<&str> = page.split("<figure data-across").skip(1).collect();
+    for figure in &figures {
+        let figure = figure.split("</figure>").next().unwrap();
+        assert_eq!(figure.matches("<output></output>").count(), 1);
+        for name in figure.split("class=\"line").skip(1) {
+            let name = name.split("data-name=\"").nth(1).unwrap().split('"').next().unwrap();
+            let place = format!("<span data-name=\"{name}\">");
+            let is_empty =
+                figure.contains(&format!("data-name=\"{name}\"")) && !figure.contains(&place);
+            assert!(!is_empty || figure.contains("d=\"\""), "{name} has no place for its value");
+        }
+    }
+    let preload = figures.iter().find(|figure| figure.contains("<b>Preload</b>")).unwrap();
+    let path = preload.split("class=\"line truth\"").nth(1).unwrap();
+    let path = path.split("d=\"M").nth(1).unwrap().split('"').next().unwrap();
+    let numbers: Vec<f64> = path.split(['M', ' ']).map(|text| text.parse().unwrap()).collect();
+    for line in &recording.summary.crossings {
+        let lift_s = line.lift_s - zero_s;
+        let near = numbers
+            .chunks(2)
+            .min_by(|a, b| (a[0] - lift_s).abs().total_cmp(&(b[0] - lift_s).abs()));
+        let [t_s, preload_n] = near.unwrap() else { panic!("pairs") };
+        assert!(
+            (t_s - lift_s).abs() < 0.01 && (preload_n - line.preload_n).abs() < 0.2,
+            "{near:?}"
+        );
+    }
 }

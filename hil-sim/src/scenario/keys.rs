@@ -128,7 +128,7 @@ fn stem(name: &str) -> &str {
 }
 
 /// Every leaf of `table` with its dotted path.
-pub(super) fn leaves(table: &Table) -> Vec<(String, &Value)> {
+pub(crate) fn leaves(table: &Table) -> Vec<(String, &Value)> {
     let mut found = Vec::new();
     for (name, value) in table {
         match value {

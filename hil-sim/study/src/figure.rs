@@ -12,6 +12,7 @@ pub enum Source {
     /// The reference models.
     Simulation,
     /// Means of ten runs of the virtual rig.
+    #[serde(rename = "virtual rig")]
     Experiment,
     /// Finite elements: in tables alone.
     #[serde(rename = "continuum")]
@@ -30,7 +31,7 @@ impl Source {
         match self {
             Self::Theory => "theory",
             Self::Simulation => "simulation",
-            Self::Experiment => "experiment, four means of ten",
+            Self::Experiment => "virtual rig, four means of ten",
             Self::FiniteElements => "continuum",
             Self::Published => "published",
             Self::Fitted => "published (fitted)",

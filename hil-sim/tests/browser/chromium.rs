@@ -82,7 +82,7 @@ impl Browser {
         let page = browser.call("Target.createTarget", &json!({ "url": "about:blank" }));
         let attach = json!({ "targetId": page["targetId"], "flatten": true });
         browser.session = browser.call("Target.attachToTarget", &attach)["sessionId"].clone();
-        for domain in ["Page", "Runtime", "Log"] {
+        for domain in ["Page", "Runtime", "Log", "Network"] {
             browser.call(&format!("{domain}.enable"), &json!({}));
         }
         browser
@@ -153,12 +153,41 @@ impl Browser {
         self.call("Emulation.setEmulatedMedia", &json!({ "media": medium, "features": feature }));
     }
 
-    /// Presses and releases the left button at a point of the window.
-    pub(super) fn click(&mut self, x: f64, y: f64) {
-        for kind in ["mousePressed", "mouseReleased"] {
-            let event = json!({ "type": kind, "x": x, "y": y, "button": "left", "clickCount": 1 });
-            self.call("Input.dispatchMouseEvent", &event);
+    /// Does this with the mouse at a point of the window, the left button held or not.
+    fn mouse(&mut self, what: &str, (x, y): (f64, f64), count: u8) {
+        let (button, held) =
+            if what == "mouseMoved" && count == 0 { ("none", 0) } else { ("left", 1) };
+        let event = json!({ "type": what, "x": x, "y": y, "button": button, "buttons": held, "clickCount": count });
+        self.call("Input.dispatchMouseEvent", &event);
+    }
+
+    /// Moves the mouse there without a button.
+    pub(super) fn hover(&mut self, at: (f64, f64)) {
+        self.mouse("mouseMoved", at, 0);
+    }
+
+    /// Clicks so many times there.
+    pub(super) fn click(&mut self, at: (f64, f64), times: u8) {
+        for count in 1..=times {
+            self.mouse("mousePressed", at, count);
+            self.mouse("mouseReleased", at, count);
         }
+    }
+
+    /// Drags from one point to another.
+    pub(super) fn drag(&mut self, from: (f64, f64), to: (f64, f64)) {
+        self.mouse("mousePressed", from, 1);
+        self.mouse("mouseMoved", to, 1);
+        self.mouse("mouseReleased", to, 1);
+    }
+
+    /// What the page has asked for since it was opened, beside itself.
+    pub(super) fn requests(&mut self) -> Vec<String> {
+        self.value("1");
+        let sent =
+            self.events.iter().filter(|event| event["method"] == "Network.requestWillBeSent");
+        let urls = sent.map(|event| event["params"]["request"]["url"].to_string());
+        urls.filter(|url| !url.starts_with("\"file:")).collect()
     }
 
     /// Errors that the page has caused since it was opened.

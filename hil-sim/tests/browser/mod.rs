@@ -13,16 +13,18 @@ use chromium::Browser;
 
 /// A browser, if the long samples are wanted and this machine has one.
 fn browser() -> Option<Browser> {
-    if !long() {
-        return None;
-    }
+    if long() { any_browser() } else { None }
+}
+
+/// A browser, if this machine has one.
+fn any_browser() -> Option<Browser> {
     let program = chromium::program();
     if program.is_none() {
         // Not `eprintln`: the tests' program keeps that to itself.
         let _ = writeln!(
             std::io::stderr(),
-            "left out: pages in a browser. No Chromium in PATH; install one (Debian: \
-             `apt install chromium`) or name its program in CHROME"
+            "left out: pages in a browser, of which only the text is tested. No Chromium in PATH; \
+             install one (Debian: `apt install chromium`) or name its program in CHROME"
         );
     }
     program.map(|program| Browser::start(&program))
@@ -37,12 +39,93 @@ fn run(expected: i32, at: &Path, arguments: &[&str]) {
 /// Where each cursor of the shown plots over time is, less where the slider's instant belongs,
 /// pixels of the drawing.
 const CURSORS: &str = "[...document.querySelectorAll('figure[data-across=time]')] \
-    .filter((f) => f.offsetParent && f.querySelector('.cursor').style.display === '') \
+    .filter((f) => f.offsetParent && f.querySelector('.cursor').getAttribute('d')) \
     .map((f) => { \
-      const [low, high, left, right] = f.dataset.frame.split(' ').map(Number); \
+      const data = f.querySelector('.data'), [low, , long] = data.getAttribute('viewBox').split(' ').map(Number); \
       const value = Number(document.getElementById('scrub').value) - Number(f.dataset.since); \
-      const x = Number(f.querySelector('.cursor').getAttribute('x1')); \
-      return Math.abs(left + (value - low) / (high - low) * (right - left) - x); })";
+      const x = Number(data.getAttribute('x')) + (value - low) / long * Number(data.getAttribute('width')); \
+      return Math.abs(Number(f.querySelector('.cursor').getAttribute('d').split(/[M ]/)[1]) - x); })";
+
+/// Brings the n-th plot over time into view and returns the point of the window at this part of its
+/// width, and the time there.
+fn point(browser: &mut Browser, n: usize, part: f64) -> ((f64, f64), f64) {
+    let place = browser.value(&format!(
+        "(() => {{ const f = [...document.querySelectorAll('figure[data-across=time]')] \
+           .filter((f) => f.offsetParent)[{n}]; \
+         f.scrollIntoView({{ block: 'center' }}); \
+         const box = f.querySelector('.plot').getBoundingClientRect(), data = f.querySelector('.data'); \
+         const [low, , long] = data.getAttribute('viewBox').split(' ').map(Number); \
+         const x = Number(data.getAttribute('x')) + {part} * Number(data.getAttribute('width')); \
+         return [box.left + x, box.top + box.height / 2, low + {part} * long + Number(f.dataset.since)]; }})()"
+    ));
+    let [x, y, t_s] = [0, 1, 2].map(|i| place[i].as_f64().expect("a number"));
+    ((x, y), t_s)
+}
+
+/// Range of time of each plot of the run.
+const RANGES: &str = "[...document.querySelectorAll('.time .data')] \
+    .map((data) => data.getAttribute('viewBox').split(' ').map(Number)).map((b) => [b[0], b[0] + b[2]])";
+
+#[test]
+fn every_plot_shows_the_time_of_the_pointer_and_they_zoom_together() {
+    let Some(mut browser) = any_browser() else { return };
+    let directory = tempfile::tempdir().unwrap();
+    run(0, directory.path(), &["deploy", "--out", "run"]);
+    let summary = std::fs::read(directory.path().join("run/summary.json")).unwrap();
+    let summary: serde_json::Value = serde_json::from_slice(&summary).unwrap();
+    browser.open(&directory.path().join("run/report.html"), 1400);
+    let times = "[...document.querySelectorAll('figure')].filter((f) => f.querySelector('output')) \
+                 .map((f) => f.querySelector('output').textContent)";
+    // In a plot of the run, and in one of a crossing, whose axis has another zero.
+    for (n, part) in [(0, 0.3), (4, 0.7), (12, 0.5)] {
+        let (at, t_s) = point(&mut browser, n, part);
+        browser.hover(at);
+        let shown = browser.value(times);
+        let shown = shown.as_array().expect("a list");
+        assert!(shown.len() > 30 && shown.iter().all(|one| one == &shown[0]), "{shown:?}");
+        let time = shown[0].as_str().unwrap().trim_end_matches(" s").parse::<f64>().unwrap();
+        assert!((time - t_s).abs() < 0.02, "{time} s shown at {t_s} s");
+        let off = browser.value(CURSORS);
+        assert!(off.as_array().unwrap().iter().all(|off| off.as_f64().unwrap() < 1.0), "{off}");
+    }
+    // At lift-off the clearance is the gap, in mm too.
+    let lift_s = summary["crossings"][1]["lift_s"].as_f64().unwrap()
+        - summary["commanded_s"].as_f64().unwrap();
+    browser.value(&format!("plots.show({lift_s})"));
+    let gap = browser.value(
+        "[...document.querySelectorAll('.time span[data-name=clearance] b')][0].textContent",
+    );
+    let gap_mm = summary["crossings"][1]["gap_mm"].as_f64().unwrap();
+    let shown = gap.as_str().unwrap().split('(').nth(1).unwrap().split(' ').next().unwrap();
+    assert!((shown.parse::<f64>().unwrap() - gap_mm).abs() < 0.01, "{gap} instead of {gap_mm} mm");
+
+    // Dragging zooms every plot of the run to the stretch; a double click shows everything again.
+    let before = browser.value(RANGES);
+    let ((from, low), (to, high)) = (point(&mut browser, 1, 0.4), point(&mut browser, 1, 0.6));
+    browser.drag(from, to);
+    let after = browser.value(RANGES);
+    let ranges = after.as_array().unwrap();
+    assert!(ranges.len() >= 8);
+    for range in ranges {
+        let [a, b] = [0, 1].map(|i| range[i].as_f64().unwrap());
+        assert!((a - low).abs() < 0.01 && (b - high).abs() < 0.01, "{range}, {low} to {high}");
+    }
+    let (middle, _) = point(&mut browser, 1, 0.5);
+    browser.click(middle, 2);
+    assert_eq!(browser.value(RANGES), before);
+    // The same by the buttons.
+    let press = |name: &str| {
+        format!(
+            "[...document.querySelectorAll('.time .zoom button')].find((b) => b.textContent === '{name}').click()"
+        )
+    };
+    browser.value(&press("zoom in"));
+    assert_ne!(browser.value(RANGES), before);
+    browser.value(&press("reset"));
+    assert_eq!(browser.value(RANGES), before);
+    assert_eq!(browser.errors(), [""; 0]);
+    assert_eq!(browser.requests(), [""; 0]);
+}
 
 /// Sets the slider to a part of its range, as a hand does.
 fn scrub(browser: &mut Browser, part: f64) {
@@ -83,17 +166,8 @@ fn the_page_of_a_run_moves_and_its_cursors_follow() {
     assert!(words.as_str().unwrap().contains("mm/s"), "{words}");
 
     // A click in a plot goes to its instant.
-    let place = browser.value(
-        "(() => { const f = [...document.querySelectorAll('figure[data-across=time]')] \
-           .find((f) => f.offsetParent && f.dataset.since === '0'); \
-         f.scrollIntoView({ block: 'center' }); \
-         const [low, high, left, right] = f.dataset.frame.split(' ').map(Number); \
-         const svg = f.querySelector('svg'), box = svg.getBoundingClientRect(); \
-         const x = (left + 0.6 * (right - left)) / svg.viewBox.baseVal.width * box.width; \
-         return [box.left + x, box.top + box.height / 2, low + 0.6 * (high - low)]; })()",
-    );
-    let [x, y, wanted] = [0, 1, 2].map(|i| place[i].as_f64().expect("a number"));
-    browser.click(x, y);
+    let (place, wanted) = point(&mut browser, 0, 0.6);
+    browser.click(place, 1);
     let now = browser.number(at);
     assert!((now - wanted).abs() < 0.02, "{now} s instead of {wanted} s");
 

@@ -176,6 +176,37 @@ fn probe_rs_has_to_be_there_and_new_enough() {
     let _ = std::fs::remove_file(old);
 }
 
+/// Minutes of building for a probe that is not there would be in vain.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_probe_is_looked_for_before_anything_is_built() {
+    let found = r#"case $1 in list) echo "No debug probes were found.";; *) echo it ran;; esac"#;
+    let alone = stand_in("probe-rs 0.33.0", found);
+    let directory = tempfile::tempdir().unwrap();
+    for arguments in [
+        &["flash"][..],
+        &["deploy", "--target", "probe"],
+        &["capture", "--target", "probe"],
+        &["live", "--headless", "--listen", "127.0.0.1:0", "--target", "probe"],
+        &["params", "get", "--target", "probe"],
+        &["bringup", "--yes"],
+    ] {
+        let output = Command::new(env!("CARGO_BIN_EXE_rig"))
+            .current_dir(directory.path())
+            .envs([("CARGO", "/nowhere/cargo"), ("PROBE_RS_PROBE", "dead:beef:none")])
+            .env("PROBE_RS", &alone)
+            .args(arguments)
+            .output()
+            .expect("the command starts");
+        let said = stderr(&output);
+        assert_eq!((code(&output), stdout(&output)), (2, ""), "{arguments:?}: {said}");
+        assert!(said.contains("no debug probe") && said.lines().count() == 1, "{said}");
+        let left = std::fs::read_dir(directory.path()).unwrap().next();
+        assert!(left.is_none(), "{arguments:?} left {left:?}");
+    }
+    let _ = std::fs::remove_file(alone);
+}
+
 #[test]
 fn a_file_that_becomes_active_is_asked_for_what_no_default_knows() {
     let directory = tempfile::tempdir().unwrap();

@@ -1,4 +1,7 @@
-//! What was measured as tables and as plots, and `docs/PERFORMANCE.md`.
+//! What was measured as tables and as plots, and its places in `docs/EMULATION.md` and `docs/PLANT.md`.
+
+use std::path::Path;
+use std::{fs, io};
 
 use hil_sim::plant::precision::Point;
 use hil_sim::table::{number, plain};
@@ -8,14 +11,29 @@ use super::peers::{LEVEL, Peers, RING};
 use crate::figure::{Figure, Panel, Series};
 use crate::figure_svg::svg;
 
-/// The page and its plots: names below `docs`, and texts.
-pub fn files(report: &Report) -> Vec<(&'static str, String)> {
+/// The pages in the folder `docs` with these tables, and the plots: names below it, and texts.
+pub fn files(report: &Report, docs: &Path) -> io::Result<Vec<(&'static str, String)>> {
+    let performance = vec![plant_panel(report)];
     let peers = vec![peers_panel(&report.peers)];
-    vec![
-        ("PERFORMANCE.md", page(report)),
-        ("figures/performance.svg", svg(&figure("performance", 1, vec![plant_panel(report)]))),
+    let model = fs::read_to_string(docs.join("EMULATION.md"))?;
+    let plant = fs::read_to_string(docs.join("PLANT.md"))?;
+    let plant = filled(&plant, "plant", &plant_table(report))?;
+    Ok(vec![
+        ("EMULATION.md", filled(&model, "model", &rollout_table(report))?),
+        ("PLANT.md", filled(&plant, "solvers", &peers_table(&report.peers))?),
+        ("figures/performance.svg", svg(&figure("performance", 1, performance))),
         ("figures/peers.svg", svg(&figure("peers", 1, peers))),
-    ]
+    ])
+}
+
+/// `page` with this table between the marks of its name.
+fn filled(page: &str, name: &str, table: &str) -> io::Result<String> {
+    let mark = format!("<!-- bench: {name} -->\n");
+    let parts = page.split_once(&mark).and_then(|(before, rest)| {
+        let (_, after) = rest.split_once("<!-- end -->")?;
+        Some(format!("{before}{mark}```text\n{}\n```\n<!-- end -->{after}", table.trim_end()))
+    });
+    parts.ok_or_else(|| io::Error::other(format!("no place for the table `{name}` in its page")))
 }
 
 fn figure(id: &'static str, columns: usize, panels: Vec<Panel>) -> Figure {
@@ -121,32 +139,22 @@ fn peers_table(peers: &Peers) -> String {
     format!("{}\n\n", plain(&["method", &within, "over the ring"], rows))
 }
 
-fn page(report: &Report) -> String {
-    let machine = format!("{} {}", std::env::consts::ARCH, std::env::consts::OS);
-    let [scipy, mujoco] = &report.peers.versions;
-    format!(
-        "# Performance\n\nWritten by `cargo rig bench --docs`; do not edit.\n\n\
-         Run time against error. Times are processor time of one thread on {machine}, the least of several runs. \
-         Cycles are textbook Cortex-M4 cycles of the emulated core, without flash wait states unless they are named. Tests hold errors and cycles.\n\n\
-         ## Rollout\n\n\
-         The tread as the firmware rolls it out ([`tread.rs`](../src/model/tread.rs)): error of the gap on twelve \
-         crossings against the plant's ring with four times the elements and a quarter of the stride. \
-         Promised are 0.7 %. Cycles are those of the costliest crossing.\n\n```text\n{}```\n\n\
-         ## Plant\n\n\
-         Gap and largest axial force of twelve crossings (three speeds and preloads, pushed and driven, both \
-         directions) against the ring with {} times the elements and as small a part of the stride. The error is that \
-         of the worst crossing, the time the mean. Promised are 0.5 % at the default.\n\n\
-         [![Error against time of the plant](figures/performance.svg)](figures/performance.svg)\n\n```text\n{}```\n\
-         \n## Other solvers\n\n\
-         The published crossing (5 mm/s, 100 N, frictionless, quasi-static) by the plant's *ring*, by {scipy} and by {mujoco}, \
-         as [`run.py`](../hil-sim/study/peers/run.py) stored them. \
-         *LSODA*, *RK23* and *DOP853* solve the ring's own equations with the height eliminated; *Radau* and *BDF* \
-         solve them with a small damper beside the contact, which makes them stiff. The equations are compiled. \
-         MuJoCo's disc has normal springs fitted to the ring at 80 and 120 N, and no memory.\n\n\
-         [![Error against time by method](figures/peers.svg)](figures/peers.svg)\n\n```text\n{}```\n",
-        rollout_table(report),
-        report.plant.finer,
-        plant_table(report),
-        peers_table(&report.peers),
-    )
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_table_replaces_the_one_of_its_name_and_the_pages_have_its_place() {
+        let page =
+            "a\n<!-- bench: x -->\nold\n<!-- end -->\nb\n<!-- bench: y -->\nc\n<!-- end -->\n";
+        let new = filled(page, "y", "new\n\n").unwrap();
+        assert_eq!(new.split("<!-- bench: y -->").next(), page.split("<!-- bench: y -->").next());
+        assert!(new.ends_with("<!-- bench: y -->\n```text\nnew\n```\n<!-- end -->\n"), "{new}");
+        assert!(filled(page, "z", "").unwrap_err().to_string().contains("`z`"));
+        let docs = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs");
+        for (page, name) in [("EMULATION", "model"), ("PLANT", "plant"), ("PLANT", "solvers")] {
+            let page = fs::read_to_string(format!("{docs}/{page}.md")).unwrap();
+            assert!(filled(&page, name, "").is_ok(), "{name}");
+        }
+    }
 }

@@ -16,7 +16,7 @@ use hil_sim::progress;
 /// Times are processor time of one thread.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
-    /// Writes `docs/PERFORMANCE.md` and its plots.
+    /// Writes the tables into `docs/EMULATION.md` and `docs/PLANT.md`, and the plots.
     #[arg(long)]
     docs: bool,
 
@@ -49,7 +49,11 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
         let measured = bench::measure(options, &|what| spinner.say(what));
         measured.map_err(failed)?
     };
-    let files = if args.docs { page::files(&report) } else { Vec::new() };
+    let files = if args.docs {
+        page::files(&report, &docs()).map_err(|error| failed(error.into()))?
+    } else {
+        Vec::new()
+    };
     let written = write(&docs(), files)?;
     let printed = Printed { report: &report, written: &written };
     output::result(args.json, &printed, || page::tables(&report) + &output::wrote(&written))?;

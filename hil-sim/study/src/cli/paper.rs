@@ -12,7 +12,7 @@ use hil_sim::cli::output;
 use hil_sim::progress;
 use hil_sim::table::plain;
 
-/// Regenerates the figures of the study as theory, simulation and experiment, and judges
+/// Regenerates the figures of the study as theory, simulation and virtual rig, and judges
 /// its claims by them.
 ///
 /// Writes a page with all figures, and the data as JSON. A claim that does not hold is a

@@ -115,7 +115,7 @@ impl Amplitudes {
         let caption = format!(
             "First transition. Theory and simulation: pushed over a frictionless wall; theory at \
              the instant at which the lower wall stops carrying, simulation the largest of the \
-             crossing. Experiment: the virtual rig at the study's loads, torque-driven, largest \
+             crossing. Virtual rig: at the study's loads, torque-driven, largest \
              value of its 0.1 s log. Continuum: the largest force until the lower wall is \
              released. The unit of the published stress is doubtful, so ratios are given; ours \
              are of hundreds of kPa, and the wave that the touch launches at 5 mm/s has {:.0} Pa. \
@@ -142,7 +142,7 @@ impl Amplitudes {
         let caption = format!(
             "The tread is fitted to the three published amplitudes with the frictionless ring, \
              which is theory and simulation of the first plot: their agreement there is no \
-             validation. In the experiment and in the other plots the wheel drives itself against \
+             validation. On the virtual rig and in the other plots the wheel drives itself against \
              a third of the 60 N, which opens the gap by some per cent. These plots show the \
              clearance between the root of the first step and the undeformed wheel; the gap is \
              its value when the lower wall stops carrying. Continuum: for treads of 5 to 12 mm \
@@ -167,7 +167,7 @@ impl Amplitudes {
                 let values = self.values(source, pick);
                 format!("{:.decimals$} to {:.decimals$} {unit}", values[0], values[to])
             };
-            format!("{} (theory, simulation, experiment).", SOURCES.map(one).join(", "))
+            format!("{} (theory, simulation, virtual rig).", SOURCES.map(one).join(", "))
         };
         let off = |published: [f64; 3], pick: fn(&Lift) -> f64| {
             let ours = self.values(Source::Simulation, pick);
@@ -287,7 +287,7 @@ impl Amplitudes {
                 area.iter().all(|part| part.abs() < MINIMAL),
                 format!(
                     "From 100 N to 120 N the contact area at lift-off changes by {:+.1} %, {:+.1} % and \
-                     {:+.1} % (theory, simulation, experiment).",
+                     {:+.1} % (theory, simulation, virtual rig).",
                     100.0 * area[0], 100.0 * area[1], 100.0 * area[2]
                 ),
                 "The gap falls because the wheel sinks in: amplitude and area cannot be had apart.",
@@ -296,7 +296,7 @@ impl Amplitudes {
                 "The gap is the amplitude of a vibration that stress waves excite.",
                 arm_over_gap(all, self) > 0.5,
                 format!(
-                    "The largest deflection of the arm in the experiment, with its bending under the force, is {:.2} of the gap.",
+                    "The largest deflection of the arm on the virtual rig, with its bending under the force, is {:.2} of the gap.",
                     arm_over_gap(all, self)
                 ),
                 "The gap is the quasi-static clearance under a wheel that floor and corner carry; it is \

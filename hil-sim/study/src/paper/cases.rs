@@ -43,7 +43,7 @@ pub fn claims(all: &[Histories]) -> Vec<Claim> {
     let [slow, pressed, fast, slowest] = [&all[0], &all[1], &all[2], &all[3]];
     let two = |a: &Histories, b: &Histories, quantity| {
         format!(
-            "{}; {} (theory; simulation; experiment, by stage).",
+            "{}; {} (theory; simulation; virtual rig, by stage).",
             peaks_text(a, quantity),
             peaks_text(b, quantity)
         )
@@ -91,13 +91,13 @@ pub fn claims(all: &[Histories]) -> Vec<Claim> {
         of("second-collision-grows-with-preload").judged(
             "In the second transition more preload makes for a larger force.",
             stage(1).iter().all(|&part| part > 0.0),
-            format!("{} from 100 to 120 N at 5 mm/s (theory, simulation, experiment).", percent(stage(1))),
+            format!("{} from 100 to 120 N at 5 mm/s (theory, simulation, virtual rig).", percent(stage(1))),
             "",
         ),
         of("third-collision-equal").judged(
             "In the third transition 20 N more preload make no difference: the peaks are nearly identical.",
             stage(2).iter().all(|part| part.abs() < NEARLY),
-            format!("{} from 100 to 120 N at 5 mm/s (theory, simulation, experiment).", percent(stage(2))),
+            format!("{} from 100 to 120 N at 5 mm/s (theory, simulation, virtual rig).", percent(stage(2))),
             "Nothing in the third transition differs but the inclination of the arm, by two degrees from the \
              second: more preload has the same effect in all three.",
         ),

@@ -122,7 +122,7 @@ impl Hold {
         let caption = "The study's conclusion, at rig loads: the preload with which a faster wheel \
                        keeps the gap of 5 mm/s and 33.3 N. Theory: the tread rolled out in \
                        fixed point, as the controller uses it. Simulation: the ring, solved for the \
-                       preload. Experiment: forty runs, mean of the three transitions. The study \
+                       preload. Virtual rig: forty runs, mean of the three transitions. The study \
                        has no figure of this.";
         let title = "The gap held by raising the preload at the step";
         Figure::new("conclusion", title, caption.to_owned(), 2, panels)
@@ -238,7 +238,7 @@ impl Hold {
             of("Boundary conditions", "six-stages").judged(
                 "A complete transition has six contact stages.",
                 staged,
-                "The controller recognises all six in every run of the experiment.".into(),
+                "The controller recognises all six in every run of the virtual rig.".into(),
                 "",
             ),
         ]

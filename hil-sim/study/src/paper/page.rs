@@ -34,7 +34,7 @@ pub fn markdown(study: &Study) -> String {
     let fitted = study.claims.iter().filter(|claim| claim.holds && claim.fitted).count();
     let mut page = format!(
         "# The study's figures, regenerated\n\nWritten by `cargo rig paper`; do not edit.\n\n\
-         Every result that the study's text describes, three times. **Theory** is the controller's model, the tread rolled out in fixed point. **Simulation** is the reference models. **Experiment** is the virtual rig with the \
+         Every result that the study's text describes, three times. **Theory** is the controller's model, the tread rolled out in fixed point. **Simulation** is the reference models. **Virtual rig** is with the \
          shipping controller, sensor noise and tolerances: forty rigs a case, four means of ten, as in the study. \
          The three are one ring of rubber elements, so they agree on the contact by construction. **Continuum** \
          is independent of them: this project's own finite elements ([fe](../../hil-sim/study/fe/README.md)), a \
@@ -68,7 +68,7 @@ fn section(page: &mut String, figure: &Figure, claims: &[Claim]) {
         figure.caption
     );
     if !figure.published.is_empty() {
-        *page += "\n| published | | theory | simulation | experiment | continuum |\n|---|---|---|---|---|---|\n";
+        *page += "\n| published | | theory | simulation | virtual rig | continuum |\n|---|---|---|---|---|---|\n";
         for mark in &figure.published {
             *page += &mark_row(mark);
         }

@@ -192,7 +192,7 @@ impl Sweep {
             format!(
                 "At rig loads, {fixed}. The wheel drives itself against a third of the 20 N on top, \
                  and the arm presses it into the wall. Theory: the tread rolled out in fixed point. \
-                 Simulation: the converged ring with memory. Experiment: forty rigs within their \
+                 Simulation: the converged ring with memory. Virtual rig: forty rigs within their \
                  tolerances, values as the sensors give them, mean of the three transitions of a \
                  deployment, a parabola for each rig, four means of ten. The two marks are apart \
                  by the largest difference between the study's means, the only value that it \

@@ -31,7 +31,7 @@ pub fn figure(all: &[Histories]) -> Figure {
                    collision that lies across it. Theory: an elastic ring of the model's \
                    effective stiffness, the arm as under a still force. Simulation: the reference \
                    models, a ring with memory and inertia, waves in the tread to the hub, six modes \
-                   of the arm. Experiment: the virtual rig logged every 0.1 s, four means of ten; forces are the plant's own. The study prints no value of its curves."
+                   of the arm. Virtual rig: logged every 0.1 s, four means of ten; forces are the plant's own. The study prints no value of its curves."
         .to_owned();
     let title = "Collision, impact and vibration over the three transitions";
     Figure::new("fig24", title, caption, CASES.len(), panels(all))
@@ -67,7 +67,7 @@ pub fn claims(all: &[Histories]) -> Vec<Claim> {
     let texts = |quantity: Quantity| {
         let all: Vec<String> = all.iter().map(|one| peaks_text(one, quantity)).collect();
         format!(
-            "By stage, {} (theory; simulation; experiment). {}. Of what makes the stages differ there is \
+            "By stage, {} (theory; simulation; virtual rig). {}. Of what makes the stages differ there is \
              the inclination of the arm alone: its thrust on the wheel falls by a few per cent from sleeve to sleeve.",
             quantity.axis(),
             all.join(". ")
@@ -85,10 +85,10 @@ pub fn claims(all: &[Histories]) -> Vec<Claim> {
     vec![
         of("three-sources-agree").fitted().judged(
             "Collision, impact and vibration show the same trends in theory, simulation and \
-             experiment.",
+             virtual rig.",
             shapes.iter().all(|&shape| shape > 0.9),
             format!(
-                "Least correlation of simulation and experiment at the log's times with theory \
+                "Least correlation of simulation and virtual rig at the log's times with theory \
                  over the four cases: collision {:.3}, impact {:.3}, vibration {:.3}.",
                 shapes[0], shapes[1], shapes[2]
             ),
@@ -128,7 +128,7 @@ pub fn claims(all: &[Histories]) -> Vec<Claim> {
             left.iter().all(|&part| part < 0.05),
             format!(
                 "Largest value after it, beyond that before the first, over the largest of all: theory \
-                 {:.3}, simulation {:.3}, experiment {:.3}. What is there before and after is the \
+                 {:.3}, simulation {:.3}, virtual rig {:.3}. What is there before and after is the \
                  drive's torque ripple, which shakes the arm between the steps as well.",
                 left[0], left[1], left[2]
             ),
@@ -137,7 +137,7 @@ pub fn claims(all: &[Histories]) -> Vec<Claim> {
         of("collision-before-2-s").judged(
             "The largest collision comes in the first transition, before 2 s.",
             collided.iter().all(|&t| t < FIRST_BEFORE_S) && highest_first(fast, Quantity::Collision),
-            format!("At 8 mm/s, 33.3 N: {} s (theory, simulation, experiment).", seconds(collided)),
+            format!("At 8 mm/s, 33.3 N: {} s (theory, simulation, virtual rig).", seconds(collided)),
             "",
         ),
         of("impact-at-2-s").judged(
@@ -146,7 +146,7 @@ pub fn claims(all: &[Histories]) -> Vec<Claim> {
                 && hit.iter().zip(&collided).all(|(hit, collided)| hit > collided),
             format!(
                 "At 8 mm/s, 33.3 N: {} s, against {} s of the collision (theory, simulation, \
-                 experiment).",
+                 virtual rig).",
                 seconds(hit),
                 seconds(collided)
             ),
@@ -159,7 +159,7 @@ pub fn claims(all: &[Histories]) -> Vec<Claim> {
             humps.iter().all(|&count| count >= 2),
             format!(
                 "Peaks of the first transition at 8 mm/s, 33.3 N: {}, {}, {} (theory, simulation, \
-                 experiment), at {} s.",
+                 virtual rig), at {} s.",
                 humps[0],
                 humps[1],
                 humps[2],
@@ -206,7 +206,7 @@ fn pairs_text(pairs: &[Pair]) -> String {
         format!("{} to {}: {}", a.case.name(), b.case.name(), changes.join(", "))
     };
     let all: Vec<String> = pairs.iter().map(text).collect();
-    format!("{} (theory, simulation, experiment).", all.join("; "))
+    format!("{} (theory, simulation, virtual rig).", all.join("; "))
 }
 
 /// Whether the highest peak is that of the first stage, in every source.

@@ -17,7 +17,7 @@ fn ends(curves: &Curves, decimals: usize, unit: &str) -> String {
         format!("{:.decimals$} to {:.decimals$} {unit}", values[0], values[values.len() - 1])
     };
     format!(
-        "Theory {}, simulation {}, experiment {}.",
+        "Theory {}, simulation {}, virtual rig {}.",
         ends(&curves.theory),
         ends(&curves.simulation),
         ends(&curves.experiment.middle())
@@ -46,7 +46,7 @@ fn bent(curves: &Curves) -> String {
     let [theory, simulation, experiment] = bends(curves).map(|bend| 100.0 * bend);
     format!(
         "Off the straight line between the ends by {theory:+.1} %, {simulation:+.1} % and \
-         {experiment:+.1} % of the change (theory, simulation, experiment)."
+         {experiment:+.1} % of the change (theory, simulation, virtual rig)."
     )
 }
 
