@@ -10,7 +10,7 @@ use interstage::rig::Rig;
 use interstage::supervise::{Command, Mode};
 use interstage::tasks::{self, COMMANDS, ENTRIES, Exchange};
 use interstage::tick::{Entry, Event, Output, Telemetry};
-use interstage::units::{Direction, Ratio};
+use interstage::units::{Direction, Q16, Ratio};
 
 fn planner() -> &'static Planner {
     forever(Planner::try_build(&Rig::prototype()).expect("the prototype is valid"))

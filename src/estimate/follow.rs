@@ -437,7 +437,8 @@ impl Estimator {
         open.height = measured.height;
         open.deepest = state.watch.deepest;
         found.slip = slip_of(&open, open.lift.map_or(state.position, |point| point.face));
-        if higher.abs() > HEIGHT_SEEN {
+        // Of a crossing that began in its middle the wall below was not measured.
+        if higher.abs() > HEIGHT_SEEN && !open.resumed {
             found.limit(Limit::StepHeight);
         }
         if open.lift.is_some() && !open.turned {
@@ -702,7 +703,8 @@ mod tests {
         assert_eq!(reported(Contact::Wall, Position::Located, 0.0), 1);
         assert_eq!(reported(Contact::Both, Position::Located, 0.0), 0);
         assert_eq!(reported(Contact::Leaving, Position::Located, 0.0), 0);
-        assert_eq!(reported(Contact::Wall, Position::Searching, 0.0), 0);
+        // On an edge the tread is pressed deeper, not less.
+        assert_eq!(reported(Contact::Wall, Position::Searching, 0.0), 1);
         // The corner at 18 mm may carry a part.
         assert_eq!(reported(Contact::Wall, Position::Located, 12.0), 0);
     }

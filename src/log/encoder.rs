@@ -329,6 +329,7 @@ mod tests {
             },
             ramp_preload: most,
             most_preload: most,
+            rolling_preload: most,
             brake_horizon: most,
             look_ahead: true,
             limited_by: LimitedBy::Drive,

@@ -188,6 +188,8 @@ pub struct Plan {
     pub ramp_preload: Newtons,
     /// Highest preload that the strategy allows, N: for a wheel that slips.
     pub most_preload: Newtons,
+    /// Preload from which the wheel may roll, N.
+    pub rolling_preload: Newtons,
     /// Gap that this gives, mm.
     pub gap: Millimetres,
     /// Friction left unused at the step, by what is learned of it.

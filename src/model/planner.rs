@@ -171,6 +171,7 @@ impl Planner {
             cross_preload: self.between_steps(),
             ramp_preload: self.between_steps(),
             most_preload: self.most(),
+            rolling_preload: self.rolling_preload(),
             gap: self.target(request.direction),
             slip_margin: self.usable,
             slips: learned.slips,
@@ -230,8 +231,8 @@ impl Planner {
             reacts: self.strategy == Strategy::Reactive,
             distance: request.distance,
             speed: request.speed,
-            starts: (request.preload < self.rolling_preload).then(|| {
-                let missing = self.rolling_preload - request.preload;
+            starts: (request.preload < self.rolling_preload()).then(|| {
+                let missing = self.rolling_preload() - request.preload;
                 self.pretightener.settles + divide(missing, self.pretightener.rate)
             }),
         }
@@ -375,6 +376,11 @@ impl Planner {
             Strategy::Constant => self.cruise_preload,
             _ => self.most_preload,
         }
+    }
+
+    /// Preload from which the wheel may roll, N: at a prescribed speed all that it is to have.
+    fn rolling_preload(&self) -> Newtons {
+        self.prescribed_speed.map_or(self.rolling_preload, |_| self.most())
     }
 
     /// Gap aimed at, mm.

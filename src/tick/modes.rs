@@ -109,7 +109,7 @@ impl Controller {
             let course = self.course(state, tick, direction);
             let targets = self.schedule.targets(self.estimator.steps(), plan, &course);
             let enough = targets.preload - self.schedule.reached_within();
-            tick.sensed.preload_filtered >= enough.min(self.rolling_preload)
+            tick.sensed.preload_filtered >= enough.min(plan.rolling_preload)
         });
         state.condition_ticks = if reached { state.condition_ticks + 1 } else { 0 };
         if state.condition_ticks >= STANDING_TICKS {

@@ -8,6 +8,7 @@ use std::path::Path;
 
 use interstage::log::ledger::Line;
 use interstage::model::Planner;
+use interstage::model::plan::PLAN_TICKS;
 use interstage::supervise::Mode;
 use interstage::tick::Event;
 use interstage::units;
@@ -199,11 +200,17 @@ fn summary(run: &Run) -> Summary {
 /// A crossing by the controller's estimates; its instants follow from the contact stage.
 fn crossing(run: &Run, line: &Line) -> CrossingLine {
     let seen = LedgerLine::from(line);
-    let closed = run.rows.partition_point(|row| row.tick <= line.at);
     let on_corner = |row: &Controller| (3..=5).contains(&row.stage);
-    let end = run.rows[..closed].iter().rposition(on_corner).map_or(closed, |place| place + 1);
-    let begin =
-        run.rows[..end].iter().rposition(|row| !on_corner(row)).map_or(0, |place| place + 1);
+    let before = |end: usize| {
+        let end = run.rows[..end].iter().rposition(on_corner).map_or(end, |place| place + 1);
+        let begin = run.rows[..end].iter().rposition(|row| !on_corner(row));
+        (begin.map_or(0, |place| place + 1), end)
+    };
+    let reviewed = run.rows.partition_point(|row| row.tick <= line.at);
+    let (begin, end) = before(reviewed);
+    // The review takes its time: what has just been touched is the step after it.
+    let is_next = run.rows.get(begin).is_some_and(|row| row.tick + 2 * PLAN_TICKS > line.at);
+    let (begin, end) = if is_next { before(begin) } else { (begin, end) };
     let span = &run.rows[begin..end.max(begin)];
     let touch = span.first();
     let lift = span.iter().find(|row| Some(row.stage) != touch.map(|first| first.stage));
