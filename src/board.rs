@@ -30,11 +30,15 @@ pub(crate) use console::Console;
 pub(crate) use flash::ParameterFlash;
 pub(crate) use guard::Guard;
 #[cfg(feature = "hil")]
-pub(crate) use hil::{Angle, Bridges, Button, CompressionSensor, PreloadSensor, Wheel, split};
+pub(crate) use hil::{
+    Angle, Bridges, Button, CompressionSensor, PreloadSensor, Wheel, paused, split,
+};
 pub(crate) use light::Lamp;
 pub(crate) use line::HostLine;
 #[cfg(not(feature = "hil"))]
-pub(crate) use pins::{Angle, Bridges, Button, CompressionSensor, PreloadSensor, Wheel, split};
+pub(crate) use pins::{
+    Angle, Bridges, Button, CompressionSensor, PreloadSensor, Wheel, paused, split,
+};
 pub(crate) use text_log::TextLog;
 
 use embassy_stm32::interrupt::{Interrupt, InterruptExt, Priority};

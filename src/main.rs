@@ -144,7 +144,7 @@ mod firmware {
             latest: &'static TickIoCell
         ) => tasks::motors(motors, watchdog, controller, latest, &EXCHANGE);
         record(latest: &'static TickIoCell) => tasks::record(latest, &EXCHANGE);
-        model(planner: &'static Planner) => tasks::model(planner, &EXCHANGE);
+        model(planner: &'static Planner) => tasks::model(planner, &EXCHANGE, board::paused);
         pressed(button: Button) => tasks::operator(button, &EXCHANGE);
         typed(console: Console) => tasks::operator(console, &EXCHANGE);
         link(line: HostLine, service: Service<ParameterFlash>) => {

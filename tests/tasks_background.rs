@@ -58,7 +58,7 @@ fn journal(written: &Record<Entry>, shown: &Record<Light>) -> (Bench, &'static E
 fn a_request_is_answered_once_and_of_several_the_latest() {
     let mut bench = Bench::new();
     let exchange = forever(Exchange::new());
-    bench.spawn(async { tasks::model(planner(), exchange).await });
+    bench.spawn(async { tasks::model(planner(), exchange, || ()).await });
     bench.run_ms(50);
     assert_eq!(plan_sequence(exchange), None);
     exchange.request_plan(request(5));

@@ -76,7 +76,7 @@ impl Board {
         bench.spawn(async { tasks::motors(motors, watchdog, controller, latest, exchange).await });
         bench.spawn(async { tasks::record(latest, exchange).await });
         if runs(TaskId::Model) {
-            bench.spawn(async { tasks::model(planner, exchange).await });
+            bench.spawn(async { tasks::model(planner, exchange, || ()).await });
         }
         if runs(TaskId::Operator(0)) {
             let operator = board.operator.clone();

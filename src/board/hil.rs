@@ -14,7 +14,9 @@ use embassy_executor::{InterruptExecutor, Spawner};
 use embassy_stm32::interrupt::{self, InterruptExt, Priority};
 use rtt_target::{DownChannel, UpChannel};
 
+use super::registers::{IWDG, IwdgKey};
 use super::rtt::Channels;
+use super::safety;
 
 /// Replaces the thread executor.
 static THREADS: InterruptExecutor = InterruptExecutor::new();
@@ -23,6 +25,12 @@ static THREADS: InterruptExecutor = InterruptExecutor::new();
 unsafe fn UART4() {
     // SAFETY: this is the executor's handler, unmasked by `start` alone.
     unsafe { THREADS.on_interrupt() }
+}
+
+/// In a pause of a plan: the host's time stands until it is there, and nobody feeds the watchdog.
+pub(crate) fn paused() {
+    IWDG.kr().write(|key| key.set_key(IwdgKey::RESET));
+    safety::fed();
 }
 
 type Begin = fn(Spawner, Channels);

@@ -10,7 +10,7 @@
 //! | FLASH | prefetch, option bytes, error correction; writes before and after the tasks |
 //! | PWR, EXTI | the supply's detector; the boost, see [`super::init`] |
 //! | SYSCFG, DBGMCU | breaks of the timers by the chip itself, what freezes with the core |
-//! | IWDG | whether its time-out has been taken over |
+//! | IWDG | whether its time-out has been taken over; in the loop's image its feeding while a plan is made |
 //! | RCC, GPIOA, GPIOC | causes of a reset; the light and the bridges' lines before anything runs |
 
 use embassy_stm32::pac;
@@ -20,6 +20,8 @@ pub(crate) use pac::adc::Adc;
 pub(crate) use pac::adc::vals::Exten;
 pub(crate) use pac::bdma::Ch as DmaChannel;
 pub(crate) use pac::gpio::vals::Moder;
+#[cfg(feature = "hil")]
+pub(crate) use pac::iwdg::vals::Key as IwdgKey;
 pub(crate) use pac::pwr::regs::Cr5;
 pub(crate) use pac::timer::TimAdv;
 pub(crate) use pac::timer::vals::{FilterValue, Ocm};

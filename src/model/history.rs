@@ -19,7 +19,7 @@ pub struct HistoryStride {
 }
 
 impl HistoryStride {
-    /// A stride of this duration in ticks, up to [`STANDS`], under this force, N, from 0 to 1023.
+    /// A stride of this duration in ticks, up to 2000, under this force, N, from 0 to 1023.
     pub fn new(ticks: u16, pressed: Newtons) -> Self {
         let code = if ticks < 128 { ticks } else { 128 + (ticks - 128) / 16 };
         Self {

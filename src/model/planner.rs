@@ -138,7 +138,7 @@ impl Planner {
     }
 
     /// Answers a request with a tread from outside, whose two kilobytes are never on the stack; it
-    /// pauses after each rollout, so that tasks beside it run on.
+    /// pauses every few strides, so that tasks beside it run on.
     pub async fn plan_pausing(
         &self,
         state: &mut TreadState,
@@ -154,7 +154,9 @@ impl Planner {
         };
         let mut learned = outcome.as_ref().map_or(learned, |outcome| outcome.learned);
         if let Some(force) = request.slipped {
-            let used = self.needed_at_least_speed(state, request, &learned, force);
+            let used = self
+                .needed_at_least_speed((&mut *state, &mut *pause), request, &learned, force)
+                .await;
             learned.slips = learned.slips.min(used.max(learned.grips));
         }
         // Until the step behind has been reviewed, the tread may turn out stiffer.
@@ -256,14 +258,16 @@ impl Planner {
             Some(speed) => (speed, speed),
             None => (floor, ceiling),
         };
-        let mut search = Search::new(self, (&mut *state, pause), scene, request, (floor, ceiling));
+        let mut search =
+            Search::new(self, (&mut *state, &mut *pause), scene, request, (floor, ceiling));
         let course = search.fastest().await;
         // A band that reaches below the floor is entered: too slow would be worse.
         let (speed, moved) = self.guard.below(course.approach.slowest_speed);
         let moved = moved && speed >= floor;
         let course = if moved {
             let approach = Approach { slowest_speed: speed, ..course.approach };
-            Course { approach, rolled: self.roll_out(state, &scene, &approach) }
+            let rolled = self.roll_out((&mut *state, &mut *pause), &scene, &approach).await;
+            Course { approach, rolled }
         } else {
             course
         };
@@ -309,9 +313,9 @@ impl Planner {
     }
 
     /// Friction that a crossing at the least speed needs under this radial force, N.
-    fn needed_at_least_speed(
+    async fn needed_at_least_speed(
         &self,
-        state: &mut TreadState,
+        rolling: (&mut TreadState, &mut impl AsyncFnMut()),
         request: &PlanRequest,
         learned: &Learned,
         force: Newtons,
@@ -325,7 +329,7 @@ impl Planner {
             slowest_speed: self.least_speed,
             ..Approach::default()
         };
-        self.roll_out(state, &scene, &approach).utilisation
+        self.roll_out(rolling, &scene, &approach).await.utilisation
     }
 
     /// Time that the margin of friction is worth which is missing, s.

@@ -46,7 +46,7 @@ const fn inverse_sqrt_guess(x: u32) -> (u32, u32) {
     (shift, horner!(t; c0, c1, c2, c3, c4) as u32)
 }
 
-/// Square root; negative arguments give 0. Error: 0.51 LSB. Source: as [`sqrt_fraction`].
+/// Square root; negative arguments give 0. Error: 0.51 LSB. Source: as `sqrt_fraction`.
 pub fn sqrt(x: Q16) -> Q16 {
     let bits = u32::try_from(x.to_bits()).unwrap_or(0);
     // 2^16 sqrt(bits) is the root in Q24; at most 1.5 LSB of that too small.

@@ -22,11 +22,12 @@ use embassy_time::{Duration, Timer, with_deadline};
 const POLL: Duration = Duration::from_millis(10);
 
 /// Answers the tick's requests for a plan, below the control rate; of several requests meanwhile,
-/// the latest counts.
-pub async fn model(planner: &Planner, exchange: &Exchange) -> ! {
+/// the latest counts. `paused` is called in each pause of a plan.
+pub async fn model(planner: &Planner, exchange: &Exchange, paused: fn()) -> ! {
     let mut tread = TreadState::default();
     let pause = async || {
         exchange.liveness.check_in(TaskId::Model, uptime());
+        paused();
         yield_now().await;
         exchange.liveness.running(TaskId::Model);
     };

@@ -15,7 +15,8 @@ const COLOURS: [RGBColor; 2] = [palette::PRELOAD, palette::SPEED];
 
 /// The picture of two runs with their names: preload, position, slip and gap.
 pub fn beside_svg(runs: [(&str, &Recording); 2]) -> String {
-    stacked(SIZE, &mut panels(runs))
+    let own = runs.map(|(name, run)| (name, run.since_command()));
+    stacked(SIZE, &mut panels([(own[0].0, &own[0].1), (own[1].0, &own[1].1)]))
 }
 
 /// Gap, preload, speed, position and slip of two runs with their names, each since its command.

@@ -213,7 +213,7 @@ impl Board {
             Box::pin(async { tasks::operator(button, exchange).await }),
             Box::pin(async { tasks::motors(motors, watchdog, controller, latest, exchange).await }),
             Box::pin(async { tasks::record(latest, exchange).await }),
-            Box::pin(async { tasks::model(planner, exchange).await }),
+            Box::pin(async { tasks::model(planner, exchange, || ()).await }),
             Box::pin(async {
                 let mut encoder = LogEncoder::new(Identity::NOBODY);
                 tasks::journal(journal, light, &mut encoder, exchange).await

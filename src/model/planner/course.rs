@@ -23,6 +23,9 @@ const MOST_TICKS: u32 = 400;
 const MOST_TICKS_BEFORE: u32 = 4000;
 /// Strides of a rollout at most.
 const MOST_STRIDES: u32 = 220;
+/// Strides between two pauses, 0.1 ms each, and steps before the tread is rolled.
+pub(super) const STRIDES_AT_ONCE: u32 = 4;
+const STEPS_AT_ONCE: u32 = 64;
 /// Travel at a steady speed that is taken at once, mm.
 const STEADY: Millimetres = q16(20_000);
 
@@ -82,9 +85,9 @@ pub(super) struct Course {
 
 impl Planner {
     /// Rolls the wheel over the step by this approach under this preload, N.
-    pub(super) fn roll_out(
+    pub(super) async fn roll_out(
         &self,
-        state: &mut TreadState,
+        (state, pause): (&mut TreadState, &mut impl AsyncFnMut()),
         scene: &Scene,
         approach: &Approach,
     ) -> RolledOut {
@@ -132,11 +135,15 @@ impl Planner {
         // What lies before the tread's first stride is driven without it.
         let mut follower = Follower::new(speed);
         let mut distance = start;
-        let mut ticks_in_all = 0;
+        let (mut ticks_in_all, mut steps) = (0, 0_u32);
         while distance > from && ticks_in_all < MOST_TICKS_BEFORE {
             let ticks = follower.step(self, approach, scene, distance);
             distance -= Q16::narrow(per_tick(follower.speed())) * Q16::from_num(ticks);
             ticks_in_all += ticks;
+            steps += 1;
+            if steps % STEPS_AT_ONCE == 0 {
+                pause().await;
+            }
         }
         drive.pressed = preload(ticks_in_all, false) + scene.arm_thrust;
         self.tread.put_down(state, along(from), &drive);
@@ -146,7 +153,10 @@ impl Planner {
         let mut carried = Q16::ZERO;
         let mut overshot = Q16::ZERO;
         let (mut here, mut speed) = (from, Q16::ZERO);
-        for _ in 0..MOST_STRIDES {
+        for stride in 0..MOST_STRIDES {
+            if stride % STRIDES_AT_ONCE == 0 {
+                pause().await;
+            }
             left += self.tread.stride();
             let mut ticks = 0;
             // Up to where it goes on the tread rolls in.

@@ -169,7 +169,8 @@ fn a_load_presses_by_the_arm_and_is_lifted_by_friction() {
     let rolled = |extra: i64| {
         let learned = Learned { extra_load: Newtons::from_num(extra), ..Learned::default() };
         let scene = planner.scene(&PlanRequest { learned, ..request }, planner.cruise_speed);
-        planner.roll_out(&mut TreadState::default(), &scene, &approach)
+        let mut state = TreadState::default();
+        block_on(planner.roll_out((&mut state, &mut async || ()), &scene, &approach))
     };
     let (known, more) = (rolled(0), rolled(8));
     // 1.05 of the load presses, 0.6 is lost to its lift.

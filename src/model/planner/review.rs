@@ -3,6 +3,7 @@
 
 #![deny(clippy::float_arithmetic)]
 
+use super::course::STRIDES_AT_ONCE;
 use super::{Planner, STRANGE, WIDE};
 use crate::model::history::{HistoryStride, STRIDES};
 use crate::model::plan::{Learned, Outcome, Review};
@@ -47,9 +48,9 @@ impl Planner {
     ///
     /// A history that is full says nothing of what was before: the wheel rolls in, as it did
     /// first, over more than a patch. One that is not began at rest.
-    fn replayed(
+    async fn replayed(
         &self,
-        state: &mut TreadState,
+        (state, pause): (&mut TreadState, &mut impl AsyncFnMut()),
         review: &Review,
         load: Newtons,
         (from, scale): (Millimetres, Ratio),
@@ -76,16 +77,20 @@ impl Planner {
             lift_off.follow(&self.tread, review.direction, &contact);
             lift_off.is_found()
         };
-        for _ in 0..roll_in {
-            roll(state, first);
-        }
         let mut last = first;
-        for stride in review.history.strides() {
+        let rolled_in = core::iter::repeat_n(first, roll_in);
+        for (at, stride) in (0..).zip(rolled_in.chain(review.history.strides())) {
+            if at % STRIDES_AT_ONCE == 0 {
+                pause().await;
+            }
             roll(state, stride);
             last = stride;
         }
         let end = state.position();
-        for _ in 0..GOES_ON {
+        for at in 0..GOES_ON {
+            if at % STRIDES_AT_ONCE == 0 {
+                pause().await;
+            }
             if roll(state, last) {
                 break;
             }
@@ -112,8 +117,8 @@ impl Planner {
         };
         let mut lift_off = LiftOff::default();
         for _ in 0..ALIGNMENTS {
-            let (lifted, reached) = self.replayed(state, review, load, (from, scale));
-            pause().await;
+            let rolling = (&mut *state, &mut *pause);
+            let (lifted, reached) = self.replayed(rolling, review, load, (from, scale)).await;
             lift_off = lifted;
             let off = end - reached;
             if off.abs() < ALIGNED {

@@ -35,7 +35,7 @@ const SLOWER: u32 = 5;
 /// Time that a gap beyond its target counts as, s for each part of it.
 const PENALTY: Seconds = q16(100_000_000);
 
-/// A search for a course; it pauses after each rollout.
+/// A search for a course; it pauses every few strides.
 pub(super) struct Search<'a, P> {
     pause: &'a mut P,
     planner: &'a Planner,
@@ -251,8 +251,10 @@ impl<'a, P: AsyncFnMut()> Search<'a, P> {
         slowest: MillimetresPerSecond,
     ) -> Course {
         let approach = self.shape(window.max(slowest), release, slowest);
-        let rolled = self.planner.roll_out(self.state, &self.scene, &approach);
-        (self.pause)().await;
+        let rolled = self
+            .planner
+            .roll_out((&mut *self.state, &mut *self.pause), &self.scene, &approach)
+            .await;
         Course { approach, rolled }
     }
 
