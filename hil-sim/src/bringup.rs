@@ -210,6 +210,8 @@ pub fn run(
         say(&format!("{}:", stage.name()));
         if !matches!(stage, Stage::Board | Stage::Sensors) && !supplied {
             operator.act(Action::SwitchOn)?;
+            // Where stages were passed before, the board has just started.
+            line.idle()?;
             supplied = true;
         }
         let mut proposed = progress.proposed.clone();

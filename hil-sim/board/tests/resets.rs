@@ -81,7 +81,7 @@ const TASKS: [(&str, &str, u64); 8] = [
     ("compression_sensor", "compression sensor", 130),
     ("arm_angle", "arm angle", 60),
     ("motors", "the control tick", 100),
-    ("model", "model", 700),
+    ("model", "model", 1050),
     ("journal", "journal", 1500),
     ("link", "an operator's task or the host's line", 300),
 ];
