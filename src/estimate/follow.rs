@@ -414,6 +414,9 @@ impl Estimator {
                         let left = table - point.face;
                         let position = state.position + left - shift;
                         state.odometry.set_by_step(sensed.travel, position);
+                        // Its edge was seen before the slide, and the wheel is behind it.
+                        let slid = landing.map_or(Q16::ZERO, |landing| landing.slid);
+                        state.odometry.slip(Q16::ZERO, open.slip.sigma_of(slid));
                         state.known = Position::Located;
                         (point.residual, open.corrected) = (-left, true);
                         left
@@ -463,6 +466,7 @@ impl Estimator {
         WatchInput {
             radius: sensed.radius.value,
             compression: sensed.compression_filtered,
+            travel: sensed.travel,
             near: to_window.is_some_and(|ahead| ahead <= Q16::ZERO),
             over: self.is_over(state),
             clear: self.clear_of(state, sensed),

@@ -44,13 +44,14 @@ mod tests {
     use super::super::{Contact, CrossingEvent, WatchInput, WatchState};
     use super::*;
     use crate::units::Direction;
-    use crate::units::{Q16, q16};
+    use crate::units::{Q16, Travel, q16};
     use proptest::prelude::*;
 
     fn seen(radius: f64, compression: f64) -> WatchInput {
         WatchInput {
             radius: Q16::from_num(radius),
             compression: Q16::from_num(compression),
+            travel: Travel::ZERO,
             near: false,
             over: false,
             clear: true,
@@ -226,6 +227,24 @@ mod tests {
 
     fn watch() -> CrossingWatch {
         CrossingWatch::try_build(&Rig::prototype()).expect("a sound rig")
+    }
+
+    #[test]
+    fn an_edge_that_no_one_expects_is_felt_however_slowly_the_wheel_sinks_off_it() {
+        let watch = watch();
+        for speed in [0.5, 1.7, 30.0] {
+            let mut state = WatchState::default();
+            watch.begin(&mut state, &seen(121.3, 0.3));
+            let touched = (0..20_000).map(|tick| 0.001 * speed * f64::from(tick)).find(|past| {
+                let fallen = 25.0 - (25.0 * 25.0 - past * past).sqrt();
+                let travel = Travel::from_num(-past);
+                let at = WatchInput { travel, ..seen(121.3 + fallen, 0.3) };
+                watch.step(&mut state, Direction::Retract, &at).is_some()
+            });
+            let off = state.baseline.output().to_num::<f64>() - 121.0;
+            let past = touched.expect("an edge");
+            assert!(past < 3.4 && off.abs() < 0.05, "{speed}: {past} {off}");
+        }
     }
 
     #[test]
