@@ -248,6 +248,7 @@ mod tests {
             preload: Q16::from_num(50),
             distance: Q16::ZERO,
             speed: Q16::ZERO,
+            searching: false,
             review: None,
             slipped: None,
         });

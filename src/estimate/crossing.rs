@@ -27,6 +27,9 @@ const TOUCH_TICKS: u8 = 3;
 /// Travel from one sample of the baseline to the next, mm: a wall is averaged over a hundred, 6 mm,
 /// against the 2.8 mm in which a wheel sinks by [`TOUCH`] off an edge, however slow it is.
 const SAMPLE: Travel = q16(60_000).widen();
+/// Fall of the compression below its largest from which the lower wall carries a retracting wheel,
+/// mm: above the sensor's noise.
+const EASES: Millimetres = q16(60_000);
 /// Rise below which a corner is taken for a false alarm, mm.
 const RELEASE: Millimetres = q16(60_000);
 /// Ticks that this must last.
@@ -92,6 +95,8 @@ pub struct WatchState {
     again: u8,
     /// Largest compression of the crossing, mm.
     pub deepest: Millimetres,
+    /// The edge has eased: the lower wall takes a retracting wheel.
+    pub eased: bool,
     /// Compression on the wall before the step, mm.
     flat: Millimetres,
     lift: Option<Lift>,
@@ -315,6 +320,7 @@ impl CrossingWatch {
         let rise = self.rise(state, direction, seen);
         if state.contact != Contact::Wall {
             state.deepest = state.deepest.max(seen.compression);
+            state.eased |= state.deepest - seen.compression > EASES;
             if direction == Direction::Retract {
                 self.keep_depth(state, seen);
             }
@@ -501,6 +507,7 @@ impl CrossingWatch {
         state.ticks = 0;
         state.again = 0;
         state.deepest = seen.compression;
+        state.eased = false;
         state.lift = None;
         state.depths = [Q16::ZERO; FALLS];
         // On retract the wheel is on the edge alone as soon as it dips.

@@ -463,11 +463,13 @@ impl Estimator {
     /// Input of the crossing watch.
     pub(super) fn watch_input(&self, state: &EstimateState, sensed: &SensedState) -> WatchInput {
         let to_window = self.steps.to_window(state.direction, self.distance(state));
+        // The wall that a search begins on is as high as its steps, whatever the table has.
+        let doubtful = state.known.is_searching() && state.watch.contact == Contact::Leaving;
         WatchInput {
             radius: sensed.radius.value,
             compression: sensed.compression_filtered,
             travel: sensed.travel,
-            near: to_window.is_some_and(|ahead| ahead <= Q16::ZERO),
+            near: to_window.is_some_and(|ahead| ahead <= Q16::ZERO) && !doubtful,
             over: self.is_over(state),
             clear: self.clear_of(state, sensed),
         }

@@ -224,10 +224,14 @@ impl EstimateState {
     }
 
     /// Speed at the lift-off that has just been detected, mm/s: it is kept until the lower wall has
-    /// surely been left. None on retract, where the wall is reached.
+    /// surely been left. On retract until it surely carries: the step may be higher than its table.
     pub fn lifting(&self) -> Option<MillimetresPerSecond> {
-        let point = self.crossing.as_ref()?.lift.filter(|_| self.direction == Direction::Deploy)?;
-        ((self.position - point.position).abs() < LIFT_WITHIN).then_some(point.held)
+        let point = self.crossing.as_ref()?.lift?;
+        let doubtful = match self.direction {
+            Direction::Deploy => (self.position - point.position).abs() < LIFT_WITHIN,
+            Direction::Retract => self.watch.contact == Contact::Both && !self.watch.eased,
+        };
+        doubtful.then_some(point.held)
     }
 
     /// The wheel slips on a corner now, or has slipped on it.
@@ -252,6 +256,11 @@ impl EstimateState {
         let expected = self.crossing.as_ref().is_some_and(|crossing| crossing.expected);
         let surprised = self.critical() && !expected;
         self.late || self.known.is_searching() && self.next_step > 0 || surprised
+    }
+
+    /// The place is not known until a step is found.
+    pub const fn is_searching(&self) -> bool {
+        self.known.is_searching()
     }
 
     /// What carries the wheel, as reported: a wheel that searches after a restart counts as on

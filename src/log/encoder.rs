@@ -293,6 +293,7 @@ mod tests {
             preload: most,
             distance: most,
             speed: most,
+            searching: true,
             review: Some(review),
             slipped: Some(most),
         };

@@ -143,6 +143,8 @@ pub struct PlanRequest {
     pub distance: Millimetres,
     /// Speed along the run, mm/s.
     pub speed: MillimetresPerSecond,
+    /// The place is not known: the step may come at once.
+    pub searching: bool,
     /// The crossing just closed.
     pub review: Option<Review>,
     /// Radial force under which the wheel slips on the corner, N.

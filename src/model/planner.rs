@@ -101,8 +101,8 @@ pub struct Planner {
     load: Newtons,
     /// Gap to hold, deploy and retract, mm.
     gap_ref: [Millimetres; 2],
-    /// Part by which the gap aimed at is below it.
-    reserve: Ratio,
+    /// Gap aimed at, deploy and retract, mm.
+    aimed: [Millimetres; 2],
     cruise_speed: MillimetresPerSecond,
     least_speed: MillimetresPerSecond,
     safe_speed: MillimetresPerSecond,
@@ -174,7 +174,7 @@ impl Planner {
             ramp_preload: self.between_steps(),
             most_preload: self.most(),
             rolling_preload: self.rolling_preload(),
-            gap: self.target(request.direction),
+            gap: self.aimed[request.direction as usize],
             slip_margin: self.usable,
             slips: learned.slips,
             short: false,
@@ -249,7 +249,7 @@ impl Planner {
         plan: &mut Plan,
     ) {
         let learned = &request.learned;
-        let target = self.target(request.direction);
+        let target = self.aimed[request.direction as usize];
         let scene = self.scene(request, plan.cruise_speed);
         let floor = self.least_speed.min(plan.cruise_speed);
         // No faster than the pre-tightener can follow the spring over the corner.
@@ -288,6 +288,7 @@ impl Planner {
         let (friction, _) = self.friction_of(learned);
         plan.slip_margin = friction - rolled.utilisation;
         plan.short = rolled.utilisation + SAME_NEED >= learned.slips;
+        let too_wide = rolled.gap > target + target * SAME_GAP;
         plan.limited_by = if moved {
             add(&mut plan.limits, Limit::ResonanceAvoided);
             LimitedBy::Resonance
@@ -295,14 +296,14 @@ impl Planner {
             LimitedBy::Drive
         } else if rolled.gap < target - target * SAME_GAP {
             LimitedBy::Friction
-        } else if slowest <= floor {
+        } else if slowest <= floor || too_wide {
             LimitedBy::LeastSpeed
         } else if rolled.rising {
             LimitedBy::Slew
         } else {
             LimitedBy::Preload
         };
-        if rolled.gap > target + target * SAME_GAP && slowest <= floor {
+        if too_wide {
             add(&mut plan.limits, Limit::SpeedFloor);
         } else if !rolled.rising && slowest < self.safe_speed {
             add(&mut plan.limits, Limit::PreloadLimited);
@@ -385,12 +386,6 @@ impl Planner {
     /// Preload from which the wheel may roll, N: at a prescribed speed all that it is to have.
     fn rolling_preload(&self) -> Newtons {
         self.prescribed_speed.map_or(self.rolling_preload, |_| self.most())
-    }
-
-    /// Gap aimed at, mm.
-    fn target(&self, direction: Direction) -> Millimetres {
-        let gap = self.gap_ref(direction);
-        gap - gap * self.reserve
     }
 
     /// Distance along the run to the face at lift-off (retract: touch-down) with this gap, mm.

@@ -35,6 +35,7 @@ impl Controller {
             preload: tick.sensed.preload_filtered,
             distance: self.estimator.distance(estimate).unwrap_or_default(),
             speed: state.profile.speed(),
+            searching: estimate.is_searching(),
             review: planning.review,
             slipped: planning.slipped,
         });

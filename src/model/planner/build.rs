@@ -7,13 +7,16 @@ use crate::model::profile::Profile;
 use crate::model::rollout::{Run, roll};
 use crate::model::timing::{SLEW_PART, Timing};
 use crate::model::tread::{Axial, Tread, TreadState};
-use crate::numeric::checked;
+use crate::numeric::{checked, divide};
 use crate::rig::{CROSSOVER_RAD_S, MAX_STEPS, PROPORTIONAL, Rig, RigError};
-use crate::units::{Direction, Millimetres, MillimetresPerSecond, Newtons, Q16, Ratio};
+use crate::units::{Direction, Millimetres, MillimetresPerSecond, Newtons, Q16, Ratio, q16};
 
 /// Rise and dip of the wheel at which a corner shows its place, mm.
 const RISE_MM: f64 = 0.16;
 const DIP_MM: f64 = 1.0;
+
+/// One sigma of a step's height, mm: a sleeve is machined to 0.05 mm, evenly spread.
+const HEIGHT_SIGMA: Millimetres = q16(28_900);
 
 /// How much farther the stiffness estimate may rise than fall.
 const STIFFER_RANGE: f64 = 10.0;
@@ -52,6 +55,13 @@ impl Planner {
             Ok(steady_gap(&tread, direction, load_n, speed, force))
         });
         let [deploy, retract] = gap_ref;
+        let (deploy, retract) = (deploy?, retract?);
+        let reserve = checked("control.gap_reserve", rig.control.gap_reserve)?;
+        let aimed = |gap: Millimetres| gap - gap * reserve;
+        let (radius, step) = (tread.radius(), tread.height());
+        // Deploying the corner of a higher step shows itself earlier. Retracting the wheel falls over
+        // a step of whose height nothing is known: `dgap/dh = (R - h) / (R + gap)`.
+        let higher = HEIGHT_SIGMA * divide(radius - step, radius + retract);
         let range = rig.control.adaptation_range;
         let scale = |to| checked("control.adaptation_range", to);
         let answers = 1.0 + PROPORTIONAL;
@@ -75,8 +85,8 @@ impl Planner {
             tangents,
             coupling: checked("plant.arm_coupling", rig.plant.arm_coupling)?,
             load: load_n,
-            gap_ref: [deploy?, retract?],
-            reserve: checked("control.gap_reserve", rig.control.gap_reserve)?,
+            gap_ref: [deploy, retract],
+            aimed: [aimed(deploy), aimed(retract) - higher],
             cruise_speed: checked("drive.cruise_speed_mm_s", rig.drive.cruise_speed_mm_s)?,
             least_speed: checked("drive.min_crossing_speed_mm_s", rig.least_planned_speed_mm_s())?,
             safe_speed: checked("control.safe_speed_mm_s", rig.control.safe_speed_mm_s)?,

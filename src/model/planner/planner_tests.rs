@@ -22,6 +22,7 @@ fn request(direction: Direction) -> PlanRequest {
         preload: q16(50_000_000),
         distance: q16(22_000_000),
         speed: Q16::ZERO,
+        searching: false,
         review: None,
         slipped: None,
     }
@@ -202,7 +203,7 @@ proptest! {
             distance: Millimetres::from_num(distance),
             ..request(direction)
         });
-        let target = planner.target(direction);
+        let target = planner.aimed[direction as usize];
         let wide = plan.gap > target + target * SAME_GAP;
         prop_assert!(plan.gap > Q16::ZERO);
         prop_assert!(!wide || plan.limits.contains(&Some(Limit::SpeedFloor)), "{plan:?}");
@@ -232,15 +233,37 @@ fn a_stiffer_tread_and_less_preload_are_crossed_slower() {
 }
 
 #[test]
-fn a_corner_that_is_felt_late_is_come_to_slower() {
+fn a_plan_over_its_target_trades_the_gap_for_time_where_the_place_is_not_known() {
     let planner = planner();
-    let window = |late: i64, unknown: bool| {
+    let learned = Learned { scale: q16(1_500_000), ..Learned::default() };
+    let [known, searching] = [false, true].map(|searching| {
+        let distance = q16(18_000_000);
+        let request = PlanRequest { learned, distance, searching, ..request(Direction::Retract) };
+        planner.plan(&request)
+    });
+    assert!(known.gap > planner.aimed[1], "{known:?}");
+    // Slow all the way for 12 s, against a hundredth of the gap for 6 s.
+    let slowest = |plan: &Plan| plan.approach.slowest_speed;
+    assert!(slowest(&searching) > slowest(&known) * q16(2_000_000), "{searching:?}");
+    assert!(searching.gap < known.gap * q16(1_030_000), "{} {}", searching.gap, known.gap);
+    for plan in [known, searching] {
+        assert_eq!(plan.limited_by, LimitedBy::LeastSpeed);
+        assert!(plan.limits.contains(&Some(Limit::SpeedFloor)));
+    }
+}
+
+#[test]
+fn a_corner_that_is_felt_late_is_crossed_within_the_same_gap() {
+    let planner = planner();
+    let plan = |late: i64, unknown: bool| {
         let learned = Learned { felt_late: [q16(late); 2], unknown, ..Learned::default() };
-        planner.plan(&PlanRequest { learned, ..request(Direction::Deploy) }).approach.window_speed
+        planner.plan(&PlanRequest { learned, ..request(Direction::Deploy) })
     };
-    assert!(window(500_000, false) < window(0, false));
+    for late in (0..=600_000).step_by(100_000) {
+        assert!(plan(late, false).gap <= planner.aimed[0], "{late}");
+    }
     // Of a tread that is not as known it is not known how late.
-    assert_eq!(window(0, true), window(600_000, true));
+    assert_eq!(plan(0, true).approach, plan(600_000, true).approach);
 }
 
 #[test]

@@ -32,8 +32,10 @@ const FIRST_SLOPE: Q16 = q16(30_000_000);
 const INFEASIBLE: Seconds = q16(1_000_000_000);
 /// Windows that are tried for a tread that no compared one suits.
 const SLOWER: u32 = 5;
-/// Time that a gap beyond its target counts as, s for each part of it.
-const PENALTY: Seconds = q16(100_000_000);
+/// Time that a gap beyond its target counts as, s for each part of it: 6 s for a hundredth.
+const PENALTY: Seconds = q16(600_000_000);
+/// Slowest speeds that are tried where none keeps the gap, as parts of the range.
+const TOO_WIDE: [Ratio; 4] = [q16(50_000), q16(120_000), q16(250_000), q16(500_000)];
 
 /// A search for a course; it pauses every few strides.
 pub(super) struct Search<'a, P> {
@@ -50,6 +52,7 @@ pub(super) struct Search<'a, P> {
     usable: Ratio,
     /// The wheel speeds up again before it lifts off.
     releases: bool,
+    searching: bool,
     /// The slowest speed that met the gap last.
     guess: MillimetresPerSecond,
     /// Time that a wider gap saves, s/mm.
@@ -64,7 +67,7 @@ impl<'a, P: AsyncFnMut()> Search<'a, P> {
         request: &PlanRequest,
         (floor, ceiling): (MillimetresPerSecond, MillimetresPerSecond),
     ) -> Self {
-        let target = planner.target(request.direction);
+        let target = planner.aimed[request.direction as usize];
         let (friction, usable) = planner.friction_of(&request.learned);
         Self {
             pause,
@@ -80,6 +83,7 @@ impl<'a, P: AsyncFnMut()> Search<'a, P> {
             releases: request.direction == Direction::Deploy
                 && !request.learned.unknown
                 && planner.prescribed_speed.is_none(),
+            searching: request.searching,
             guess: ceiling,
             per_gap: q16(-1_500_000),
         }
@@ -146,7 +150,10 @@ impl<'a, P: AsyncFnMut()> Search<'a, P> {
                 costs = [faster, self.cost_on_target(inner[1], release).await];
             }
         }
-        if costs[0] < costs[1] { (inner[0], costs[0]) } else { (inner[1], costs[1]) }
+        // The section does not come to its ends.
+        let last = self.cost_on_target(fastest, release).await;
+        let windows = [(inner[0], costs[0]), (inner[1], costs[1]), (fastest, last)];
+        windows.into_iter().min_by_key(|(_, cost)| *cost).unwrap_or((fastest, last))
     }
 
     /// Time of the course with this window and release whose gap is the target, s, by
@@ -157,18 +164,20 @@ impl<'a, P: AsyncFnMut()> Search<'a, P> {
         release: Millimetres,
     ) -> Seconds {
         let [course, before] = self.approach_target(window, release, NEAR).await;
-        let (gap, cost) = (course.rolled.gap, self.cost(&course.rolled));
+        let (gap, cost) = (course.rolled.gap, self.cost(&course));
         let slowest = course.approach.slowest_speed;
         if slowest > self.floor {
             self.guess = slowest;
         } else if gap > self.target {
-            return cost + INFEASIBLE + divide(gap - self.target, self.target) * PENALTY;
+            return cost + INFEASIBLE;
         }
         let apart = before.rolled.gap - gap;
         if before.rolled.gap > Q16::ZERO && apart.abs() > self.target * WITHIN {
-            self.per_gap = divide(self.cost(&before.rolled) - cost, apart).min(Q16::ZERO);
+            self.per_gap = divide(self.cost(&before) - cost, apart).min(Q16::ZERO);
         }
-        cost + (self.target - gap) * self.per_gap
+        // Under its target at the window's speed, this window gives no more.
+        let capped = slowest >= window.min(self.ceiling) && gap < self.target;
+        cost + if capped { Q16::ZERO } else { (self.target - gap) * self.per_gap }
     }
 
     /// The course with this window and release whose gap is the target or a little less.
@@ -223,7 +232,8 @@ impl<'a, P: AsyncFnMut()> Search<'a, P> {
         }
     }
 
-    /// The course, or a slower one if the margin that it saves is worth its time.
+    /// The course, or a slower one if the margin that it saves is worth its time, or a faster one if
+    /// none keeps the gap and what it adds is worth it.
     async fn gripping(
         &mut self,
         window: MillimetresPerSecond,
@@ -231,12 +241,20 @@ impl<'a, P: AsyncFnMut()> Search<'a, P> {
         course: Course,
     ) -> Course {
         let mut best = course;
-        if self.price(&course.rolled) > Q16::ZERO {
+        if !self.fits(&course.rolled) && self.searching {
+            for part in TOO_WIDE {
+                let speed = self.floor + (self.ceiling - self.floor) * part;
+                let faster = self.roll(window.max(speed), release, speed).await;
+                if self.cost_too_wide(&faster) < self.cost_too_wide(&best) {
+                    best = faster;
+                }
+            }
+        } else if self.price(&course.rolled) > Q16::ZERO {
             let fastest = course.approach.slowest_speed;
             for part in [q16(750_000), q16(500_000), q16(250_000), Q16::ZERO] {
                 let slower =
                     self.roll(window, release, self.floor + (fastest - self.floor) * part).await;
-                if self.cost(&slower.rolled) < self.cost(&best.rolled) {
+                if self.cost(&slower) < self.cost(&best) {
                     best = slower;
                 }
             }
@@ -262,9 +280,18 @@ impl<'a, P: AsyncFnMut()> Search<'a, P> {
         rolled.gap <= self.target && rolled.gap > Q16::ZERO
     }
 
-    fn cost(&self, rolled: &RolledOut) -> Seconds {
+    fn cost(&self, course: &Course) -> Seconds {
+        let rolled = &course.rolled;
         let before = (self.scene.distance - rolled.from).max(Q16::ZERO);
-        divide(before, self.scene.cruise) + rolled.takes + rolled.regains + self.price(rolled)
+        // A wheel that searches is as slow as at a corner.
+        let slowest = course.approach.slowest_speed;
+        let speed = if self.searching { slowest } else { self.scene.cruise };
+        divide(before, speed) + rolled.takes + rolled.regains + self.price(rolled)
+    }
+
+    /// The same with what the gap is beyond its target.
+    fn cost_too_wide(&self, course: &Course) -> Seconds {
+        self.cost(course) + divide(course.rolled.gap - self.target, self.target) * PENALTY
     }
 
     /// Time that the margin of friction is worth which this lacks, s.
