@@ -278,7 +278,12 @@ impl Estimator {
             }
         };
         if lost > Q16::ZERO {
-            let sigma = open.slip.sigma_of(lost.min(open.slip.lost));
+            // The face that corrects a retracting wheel was seen before its slide: what that adds
+            // counts behind the step.
+            let sigma = match state.direction {
+                Direction::Deploy => open.slip.sigma_of(lost.min(open.slip.lost)),
+                Direction::Retract => Q16::ZERO,
+            };
             state.odometry.slip(lost, sigma);
             state.begin_tick(sensed.travel);
         }
@@ -400,7 +405,7 @@ impl Estimator {
                 let landing = open.landing.or_else(|| {
                     let landing = open.slide.landing()?;
                     open.slip.lost += landing.slid;
-                    state.odometry.slip(landing.lost, open.slip.sigma_of(landing.slid));
+                    state.odometry.slip(landing.lost, Q16::ZERO);
                     state.begin_tick(sensed.travel);
                     Some(landing)
                 });
@@ -414,9 +419,6 @@ impl Estimator {
                         let left = table - point.face;
                         let position = state.position + left - shift;
                         state.odometry.set_by_step(sensed.travel, position);
-                        // Its edge was seen before the slide, and the wheel is behind it.
-                        let slid = landing.map_or(Q16::ZERO, |landing| landing.slid);
-                        state.odometry.slip(Q16::ZERO, open.slip.sigma_of(slid));
                         state.known = Position::Located;
                         (point.residual, open.corrected) = (-left, true);
                         left
@@ -428,6 +430,10 @@ impl Estimator {
                         self.correct(state, sensed, (open.step, residual), found) - point.residual
                     }
                 };
+                let slid = landing.map_or(Q16::ZERO, |landing| landing.slid);
+                if slid > Q16::ZERO {
+                    state.odometry.slip(Q16::ZERO, open.slip.sigma_of(slid));
+                }
                 point.face += left;
                 point.residual += left;
                 state.begin_tick(sensed.travel);

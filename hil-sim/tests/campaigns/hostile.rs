@@ -249,6 +249,7 @@ fn ask(planner: &Planner, seed: u64) {
             preload: Q16::from_num(33),
             distance: Q16::from_num(4),
             speed: Q16::ZERO,
+            searching: false,
             review: Some(review),
             slipped: Some(any()),
         };
