@@ -405,6 +405,7 @@ impl Estimator {
                 let landing = open.landing.or_else(|| {
                     let landing = open.slide.landing()?;
                     open.slip.lost += landing.slid;
+                    open.landing = Some(landing);
                     state.odometry.slip(landing.lost, Q16::ZERO);
                     state.begin_tick(sensed.travel);
                     Some(landing)
@@ -430,9 +431,8 @@ impl Estimator {
                         self.correct(state, sensed, (open.step, residual), found) - point.residual
                     }
                 };
-                let slid = landing.map_or(Q16::ZERO, |landing| landing.slid);
-                if slid > Q16::ZERO {
-                    state.odometry.slip(Q16::ZERO, open.slip.sigma_of(slid));
+                if let Some(landing) = landing.filter(|landing| landing.slid > Q16::ZERO) {
+                    state.odometry.slip(Q16::ZERO, landing.sigma());
                 }
                 point.face += left;
                 point.residual += left;
@@ -556,7 +556,8 @@ struct Measured {
 
 /// Slip of a crossing so far, if any.
 fn slip_of(open: &OpenCrossing, position: Millimetres) -> Option<Slip> {
-    let (amount, sigma) = (open.slip.lost, open.slip.sigma());
+    let amount = open.slip.lost;
+    let sigma = open.landing.map_or(open.slip.sigma(), |landing| landing.sigma());
     (amount > Q16::ZERO).then_some(Slip { position, amount, sigma })
 }
 

@@ -57,6 +57,14 @@ pub struct Landing {
     pub lost: Millimetres,
 }
 
+impl Landing {
+    /// One sigma of the slide, mm: what is left of the least squares, and how the face moves without
+    /// one.
+    pub fn sigma(&self) -> Millimetres {
+        q16(150_000) + self.slid * q16(150_000)
+    }
+}
+
 /// Where a tick has the face over the axial travel, mm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Face {

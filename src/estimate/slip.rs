@@ -19,9 +19,9 @@ const MOST: Millimetres = q16(800_000);
 /// Windows without slip after which the wheel grips again.
 const GRIPS_AFTER: u8 = 2;
 
-/// One sigma of a measured slip, mm, and the part of it that adds: what a window hides at
-/// both ends, and how the face moves without slip.
-const WINDOW_SIGMA: Millimetres = q16(100_000);
+/// One sigma of a measured slip, mm, and the part of it that adds: three quarters of a window, which
+/// hide at its ends, and how the face moves without slip.
+const WINDOW_SIGMA: Millimetres = q16(300_000);
 const PART_SIGMA: Ratio = q16(200_000);
 
 /// Slip of one crossing.
