@@ -207,11 +207,13 @@ pub enum Limit {
     WheelSlipped = 218,
     /// A step is not as high as the table has it.
     StepHeight = 219,
+    /// The wheel is beyond the end of travel: a step corrected the position late.
+    EndOverrun = 220,
 }
 
 impl Limit {
     /// Every limit, in the order of codes.
-    pub const ALL: [Self; 19] = [
+    pub const ALL: [Self; 20] = [
         Self::StepEarly,
         Self::StepLate,
         Self::StepMissing,
@@ -231,6 +233,7 @@ impl Limit {
         Self::GapWide,
         Self::WheelSlipped,
         Self::StepHeight,
+        Self::EndOverrun,
     ];
 
     /// The stable code.
@@ -265,6 +268,7 @@ impl Limit {
             Self::GapWide => "the measured gap is more than 3 % over the reference",
             Self::WheelSlipped => "the wheel slipped on a corner",
             Self::StepHeight => "a step is not as high as the table has it",
+            Self::EndOverrun => "the wheel is beyond the end: a step showed the place late",
             Self::CoreHalted => "a debugger halted the core, and the motors were off meanwhile",
         }
     }

@@ -111,7 +111,9 @@ impl RunLine {
 
 /// Whether a limit says that the run does not end where it should.
 fn reports_end(code: u16) -> bool {
-    [Limit::StepMissing, Limit::PositionUnconfirmed].iter().any(|limit| limit.code() == code)
+    [Limit::StepMissing, Limit::PositionUnconfirmed, Limit::EndOverrun]
+        .iter()
+        .any(|limit| limit.code() == code)
 }
 
 /// Slip that is named wrong by more than this, mm, and by more than this part of it; distance from
@@ -130,6 +132,7 @@ fn is_unreported(summary: &Summary, limits: &[u16], travel_mm: f64) -> bool {
     crossings.iter().any(|c| off(c.slip_mm, c.slip_measured_mm.unwrap_or(0.0)))
         || off(summary.slip_mm - crossed, 0.0)
         || (summary.travel_mm - travel_mm).abs() > END_MM
+            && !limits.contains(&Limit::EndOverrun.code())
         || wide && !limits.contains(&Limit::GapWide.code())
 }
 

@@ -61,7 +61,7 @@ impl Landing {
     /// One sigma of the slide, mm: what is left of the least squares, and how the face moves without
     /// one.
     pub fn sigma(&self) -> Millimetres {
-        q16(150_000) + self.slid * q16(150_000)
+        q16(150_000) + self.slid * q16(200_000)
     }
 }
 

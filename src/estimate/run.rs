@@ -10,7 +10,8 @@ use crate::units::{Direction, Millimetres, Q16, Ratio, Tick, q16};
 /// hysteresis of a corner, and the tolerances of sleeve and arm.
 const LEVEL_WITHIN: Ratio = q16(120_000);
 
-/// Largest sigma of the position, and distance beyond the end, with which a run has arrived, mm.
+/// Largest sigma of the position with which a run has arrived, and distance beyond the end that is
+/// not reported, mm.
 const PLACE_WITHIN: Millimetres = q16(500_000);
 
 impl Estimator {
@@ -140,8 +141,6 @@ impl Estimator {
             Direction::Deploy => (self.steps.count() + state.extra).saturating_sub(state.missed),
             Direction::Retract => 0,
         };
-        // A step that corrected the position late has the wheel beyond the end.
-        let past = -self.steps.remaining(state.direction, state.position);
         let on_wall = matches!(state.watch.contact, Contact::Wall | Contact::Leaving);
         // Steps that are not as high as the table has them add up.
         let off = (sensed.steps_up - Q16::from_num(expected)).abs() * self.steps.height();
@@ -149,11 +148,16 @@ impl Estimator {
             sensed.level == expected || off <= self.steps.height().half() + state.raised.abs();
         if !on_wall || !level || state.known.is_searching() {
             Err(Fault::LevelMismatch)
-        } else if self.sigma(state) > PLACE_WITHIN || past > PLACE_WITHIN {
+        } else if self.sigma(state) > PLACE_WITHIN {
             Err(Fault::PlaceUnconfirmed)
         } else {
             Ok(())
         }
+    }
+
+    /// Whether the wheel is beyond the end of travel.
+    pub fn is_beyond(&self, state: &EstimateState) -> bool {
+        -self.steps.remaining(state.direction, state.position) > PLACE_WITHIN
     }
 
     /// One sigma of the position, mm: that of the odometry, with the slip that was measured. A
@@ -279,13 +283,15 @@ mod tests {
     }
 
     #[test]
-    fn at_the_end_the_place_must_be_sure_and_there() {
-        let confirmed = |position: f64| {
-            let state = state(Direction::Retract, position, 0);
-            estimator().confirms_end(&state, &sensed(0, 0.0, 0.3))
-        };
-        assert_eq!(confirmed(-0.45), Ok(()));
-        assert_eq!(confirmed(-0.55), Err(Fault::PlaceUnconfirmed));
+    fn beyond_the_end_is_farther_than_a_place_is_unsure() {
+        for (direction, position, beyond) in [
+            (Direction::Retract, -0.45, false),
+            (Direction::Retract, -0.55, true),
+            (Direction::Deploy, 80.45, false),
+            (Direction::Deploy, 80.55, true),
+        ] {
+            assert_eq!(estimator().is_beyond(&state(direction, position, 0)), beyond);
+        }
     }
 
     #[test]

@@ -133,7 +133,12 @@ impl Controller {
             return;
         }
         match self.estimator.confirms_end(&state.estimate, tick.sensed) {
-            Ok(()) => tick.trigger(Trigger::Arrived),
+            Ok(()) => {
+                if self.estimator.is_beyond(&state.estimate) {
+                    tick.log(Event::Limit(Limit::EndOverrun));
+                }
+                tick.trigger(Trigger::Arrived);
+            }
             Err(fault) => tick.fail(fault),
         }
     }

@@ -168,8 +168,9 @@ impl<'a, P: AsyncFnMut()> Search<'a, P> {
         let slowest = course.approach.slowest_speed;
         if slowest > self.floor {
             self.guess = slowest;
-        } else if gap > self.target {
-            return cost + INFEASIBLE;
+        }
+        if gap > self.target + self.target * NEAR || slowest <= self.floor && gap > self.target {
+            return self.cost_too_wide(&course) + INFEASIBLE;
         }
         let apart = before.rolled.gap - gap;
         if before.rolled.gap > Q16::ZERO && apart.abs() > self.target * WITHIN {
