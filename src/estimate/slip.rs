@@ -3,6 +3,7 @@
 
 #![deny(clippy::float_arithmetic)]
 
+use crate::numeric::sqrt;
 use crate::units::{Millimetres, Q16, Ratio, Travel, q16};
 
 /// Travel of the tread over which tread and edge are compared, mm: ten steps of the arm's code, as
@@ -85,10 +86,13 @@ impl CornerSlip {
         WINDOW_SIGMA + self.lost * PART_SIGMA
     }
 
-    /// One sigma that the last `lost` of it adds to the position, mm.
+    /// One sigma that the last `lost` of it adds to the position, mm: what the parts of a slip are
+    /// off by has one cause, so that in all it is [`Self::sigma`].
     pub(super) fn sigma_of(&self, lost: Millimetres) -> Millimetres {
-        let begins = lost == self.lost;
-        lost * PART_SIGMA + if begins { WINDOW_SIGMA } else { Q16::ZERO }
+        let now = self.sigma();
+        let begins = lost >= self.lost;
+        let before = if begins { Q16::ZERO } else { now - lost * PART_SIGMA };
+        sqrt((now - before) * (now + before))
     }
 }
 
@@ -129,6 +133,19 @@ mod tests {
         fn a_wheel_that_grips_slips_nothing(noise in 0.0..0.06f64, drift in -0.5..0.3f64) {
             prop_assert_eq!(found(0.0, 0.0, noise, drift), 0.0);
         }
+    }
+
+    #[test]
+    fn what_a_slip_in_parts_adds_is_as_unsure_as_the_whole() {
+        let mut slip = CornerSlip::default();
+        let variance: f64 = (0..10)
+            .map(|_| {
+                slip.lost += q16(400_000);
+                slip.sigma_of(q16(400_000)).to_num::<f64>().powi(2)
+            })
+            .sum();
+        let whole = slip.sigma().to_num::<f64>();
+        assert!((variance.sqrt() - whole).abs() < 1e-3, "{variance} {whole}");
     }
 
     #[test]
