@@ -14,6 +14,7 @@ fn a_prescribed_speed_is_planned() {
         preload: Q16::from_num(50),
         distance: Q16::from_num(4),
         speed: Q16::ZERO,
+        searching: false,
         review: None,
         slipped: None,
     };

@@ -25,6 +25,7 @@ fn request(sequence: u32) -> PlanRequest {
         preload: Ratio::from_num(50),
         distance: Ratio::from_num(4),
         speed: Q16::ZERO,
+        searching: false,
         review: None,
         slipped: None,
     }
