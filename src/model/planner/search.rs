@@ -34,8 +34,9 @@ const INFEASIBLE: Seconds = q16(1_000_000_000);
 const SLOWER: u32 = 5;
 /// Time that a gap beyond its target counts as, s for each part of it: 6 s for a hundredth.
 const PENALTY: Seconds = q16(600_000_000);
-/// Slowest speeds that are tried where none keeps the gap, as parts of the range.
-const TOO_WIDE: [Ratio; 4] = [q16(50_000), q16(120_000), q16(250_000), q16(500_000)];
+/// Slowest speeds that are tried where none keeps the gap, as parts of the range: at faster ones the
+/// gap of coupled rubber grows more than the rollout has it.
+const TOO_WIDE: [Ratio; 2] = [q16(25_000), q16(50_000)];
 
 /// A search for a course; it pauses every few strides.
 pub(super) struct Search<'a, P> {
