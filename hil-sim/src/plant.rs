@@ -4,6 +4,7 @@
 pub mod actuators;
 pub mod arm;
 pub mod balance;
+pub mod course;
 pub mod crossing;
 pub mod draw;
 pub mod energy;

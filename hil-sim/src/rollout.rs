@@ -80,9 +80,22 @@ impl Wheel {
 
     /// A crossing; none where the lower wall carries until the step is under the centre.
     pub fn cross(&self, setup: &CrossingSetup) -> Option<Crossed> {
-        let (speed, force) = (Q16::from_num(setup.speed_mm_s), Q16::from_num(setup.preload_n));
+        self.cross_along(setup, &|_| (setup.speed_mm_s, setup.preload_n))
+    }
+
+    /// The same with the speed, mm/s, and the radial force, N, of each place of the axle, mm from
+    /// the face outwards.
+    pub fn cross_along(
+        &self,
+        setup: &CrossingSetup,
+        course: &dyn Fn(f64) -> (f64, f64),
+    ) -> Option<Crossed> {
+        let course = |position: Q16| {
+            let (speed, force) = course(position.to_num());
+            (Q16::from_num(speed), Q16::from_num(force))
+        };
         let mut state = TreadState::default();
-        let rolled = roll(&self.tread, &mut state, &self.run(setup), |_| (speed, force));
+        let rolled = roll(&self.tread, &mut state, &self.run(setup), course);
         let lift = rolled.lift;
         let (ahead_mm, above_mm) =
             (-lift.position.to_num::<f64>(), lift.centre.to_num::<f64>() - self.step_mm);

@@ -1,4 +1,6 @@
-//! `rig crossing`: one isolated crossing at constant speed and preload.
+//! `rig crossing`: one isolated crossing, at constant speed and preload or along a course.
+
+use std::path::PathBuf;
 
 use clap::ValueEnum;
 use interstage::rig::Rig;
@@ -9,18 +11,14 @@ use super::failure::{Failure, Outcome};
 use super::output;
 use super::scenario::ScenarioArgs;
 use crate::plant::balance::Axial;
-use crate::plant::crossing::{CrossingCase, cross};
-use crate::plant::mismatch::Mismatch;
+use crate::plant::course::{Course, MAX_PRELOAD_N, MAX_SPEED_MM_S};
+use crate::plant::crossing::{CrossingCase, cross_along};
 use crate::plant::ring::RingParameters;
 use crate::progress;
 use crate::rollout::{CrossingSetup, Wheel};
 use crate::scenario::Scenario;
 use crate::table::{number, plain};
 
-/// Fastest crossing, mm/s.
-const MAX_SPEED_MM_S: f64 = 2000.0;
-/// Largest preload, N.
-const MAX_PRELOAD_N: f64 = 1000.0;
 /// Elements of the ring and stride, mm: the gap is within 0.1 % of that at half the stride
 /// and twice the elements.
 const FINENESS: (usize, f64) = (5760, 0.005);
@@ -28,7 +26,7 @@ const FINENESS: (usize, f64) = (5760, 0.005);
 /// twice the elements.
 const FINENESS_COUPLED: (usize, f64) = (1440, 0.02);
 
-/// One isolated crossing at constant speed and preload, without arm and controller.
+/// One isolated crossing, at constant speed and preload or along a course, without arm and controller.
 ///
 /// Figures of the ring are taken over the complete crossing: the largest axial force of
 /// the contact, its work, the largest tread compression, the largest friction utilisation.
@@ -38,12 +36,29 @@ const FINENESS_COUPLED: (usize, f64) = (1440, 0.02);
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
     /// Axial speed, mm/s.
-    #[arg(long, value_name = "V", allow_negative_numbers = true)]
-    speed_mm_s: f64,
+    #[arg(
+        long,
+        value_name = "V",
+        allow_negative_numbers = true,
+        required_unless_present = "course"
+    )]
+    speed_mm_s: Option<f64>,
 
     /// Radial preload, N.
-    #[arg(long, value_name = "P", allow_negative_numbers = true)]
-    preload_n: f64,
+    #[arg(
+        long,
+        value_name = "P",
+        allow_negative_numbers = true,
+        required_unless_present = "course"
+    )]
+    preload_n: Option<f64>,
+
+    /// Speed and preload over the place, in place of constant ones: CSV with the columns `x_mm` (of
+    /// the axle from the face outwards, in the order of the run), `speed_mm_s`, `preload_n`.
+    ///
+    /// Straight lines between the rows; the first holds before it, the last behind it.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["speed_mm_s", "preload_n"])]
+    course: Option<PathBuf>,
 
     /// What computes the crossing.
     #[arg(long, value_enum, default_value_t = Method::Ring)]
@@ -100,12 +115,14 @@ pub(super) fn check(case: &CrossingSetup, [speed, preload]: [&str; 2]) -> Result
 /// The figures by this method.
 pub(super) fn compute(
     case: &CrossingSetup,
+    course: Option<&Course>,
     method: Method,
     scenario: &Scenario,
 ) -> Result<Figures, Failure> {
+    let at = |x_mm: f64| course.map_or((case.speed_mm_s, case.preload_n), |course| course.at(x_mm));
     match method {
-        Method::Ring => ring(&scenario.rig, &scenario.mismatch, case),
-        Method::Fixed => fixed(&scenario.rig, case),
+        Method::Ring => ring(scenario, case, &at),
+        Method::Fixed => fixed(&scenario.rig, case, &at),
         Method::Reduced => Err(Failure::input(
             "--method reduced: the reduced model is gone, expected ring or fixed",
         )),
@@ -129,16 +146,25 @@ struct Printed<'a> {
     method: Method,
     rig: &'a str,
     direction: &'static str,
-    #[serde(flatten)]
-    case: CrossingSetup,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    speed_mm_s: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    preload_n: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    course: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    load_n: Option<f64>,
     #[serde(flatten)]
     figures: Figures,
 }
 
 pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
+    let read = |path: &PathBuf| Course::read(path, args.retract).map_err(Failure::input);
+    let course = args.course.as_ref().map(read).transpose()?;
+    let start = course.as_ref().map(Course::start);
     let mut case = CrossingSetup {
-        speed_mm_s: args.speed_mm_s,
-        preload_n: args.preload_n,
+        speed_mm_s: start.map(|start| start.0).or(args.speed_mm_s).unwrap_or_default(),
+        preload_n: start.map(|start| start.1).or(args.preload_n).unwrap_or_default(),
         direction: if args.retract { Direction::Retract } else { Direction::Deploy },
         load_n: None,
     };
@@ -148,25 +174,28 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     case.load_n = args.driven.then_some(loads.top_load_n * loads.top_load_share);
     let figures = {
         let _progress = progress::spinner("crossing");
-        compute(&case, args.method, &scenario)?
+        compute(&case, course.as_ref(), args.method, &scenario)?
     };
     let printed = Printed {
         method: args.method,
         rig: &scenario.preset,
         direction: if args.retract { "retract" } else { "deploy" },
-        case,
+        speed_mm_s: args.speed_mm_s,
+        preload_n: args.preload_n,
+        course: args.course.as_ref().map(|path| path.display().to_string()),
+        load_n: case.load_n,
         figures,
     };
-    output::result(args.json, &printed, || human(&printed))?;
+    output::result(args.json, &printed, || human(&printed, &case))?;
     Ok(Outcome::Good)
 }
 
-fn human(printed: &Printed<'_>) -> String {
+fn human(printed: &Printed<'_>, case: &CrossingSetup) -> String {
     let method = match printed.method {
         Method::Ring => "ring",
         Method::Fixed | Method::Reduced => "tread rolled out in fixed point",
     };
-    let (case, figures) = (&printed.case, &printed.figures);
+    let figures = &printed.figures;
     let driven =
         case.load_n.map_or("frictionless".to_owned(), |load| format!("driven against {load:.2} N"));
     // Hardly pressed, it slides at any friction.
@@ -181,28 +210,37 @@ fn human(printed: &Printed<'_>) -> String {
     let rows = rows
         .into_iter()
         .filter_map(|(name, value, unit)| Some(vec![name.into(), value?, unit.into()]));
+    let moved = match &printed.course {
+        Some(course) => format!("along {course}"),
+        None => format!("at {} mm/s under {} N", case.speed_mm_s, case.preload_n),
+    };
     format!(
-        "{} at {} mm/s under {} N, {driven}, rig {}, by the {method}\n{}\n",
+        "{} {moved}, {driven}, rig {}, by the {method}\n{}\n",
         if case.direction == Direction::Retract { "Drop" } else { "Climb" },
-        case.speed_mm_s,
-        case.preload_n,
         printed.rig,
         plain(&["", "value", "unit"], rows)
     )
 }
 
 /// The ring with memory, as the plant has it.
-fn ring(rig: &Rig, mismatch: &Mismatch, case: &CrossingSetup) -> Result<Figures, Failure> {
+fn ring(
+    scenario: &Scenario,
+    case: &CrossingSetup,
+    course: &dyn Fn(f64) -> (f64, f64),
+) -> Result<Figures, Failure> {
+    let (rig, mismatch) = (&scenario.rig, &scenario.mismatch);
+    let driven = case.load_n.is_some();
     let coupled = mismatch.tread_thickness_mm > 0.0;
     let (elements, stride_mm) = if coupled { FINENESS_COUPLED } else { FINENESS };
-    let result = cross(&CrossingCase {
+    let case = CrossingCase {
         ring: RingParameters::of(rig, elements).with_mismatch(mismatch),
         step_height_mm: rig.rig.step_height_mm,
         speed_mm_s: case.speed_mm_s * f64::from(case.direction.sign()),
         preload_n: case.preload_n,
         axial: case.load_n.map_or(Axial::Pushed, Axial::Driven),
         stride_mm,
-    })?;
+    };
+    let result = cross_along(&case, course)?;
     if result.lift == (0.0, 0.0) {
         return Err(no_gap());
     }
@@ -211,17 +249,23 @@ fn ring(rig: &Rig, mismatch: &Mismatch, case: &CrossingSetup) -> Result<Figures,
         corner_force_n: result.corner_force_n,
         climb_work_mj: result.climb_work_mj,
         embedding_mm: result.embedding_mm,
-        mu_needed: case.load_n.map(|_| result.mu_needed),
+        mu_needed: driven.then_some(result.mu_needed),
     })
 }
 
 /// The tread rolled out as the firmware has it.
-fn fixed(rig: &Rig, case: &CrossingSetup) -> Result<Figures, Failure> {
-    let crossed = Wheel::try_build(rig)?.cross(case).ok_or_else(no_gap)?;
+fn fixed(
+    rig: &Rig,
+    case: &CrossingSetup,
+    course: &dyn Fn(f64) -> (f64, f64),
+) -> Result<Figures, Failure> {
+    let crossed = Wheel::try_build(rig)?.cross_along(case, course).ok_or_else(no_gap)?;
     Ok(Figures {
         gap_mm: crossed.gap_mm,
         corner_force_n: crossed.corner_force_n,
-        climb_work_mj: f64::from(case.direction.sign()) * case.preload_n * rig.rig.step_height_mm,
+        climb_work_mj: f64::from(case.direction.sign())
+            * course(-crossed.ahead_mm).1
+            * rig.rig.step_height_mm,
         embedding_mm: crossed.depth_mm,
         mu_needed: case.load_n.map(|_| crossed.utilisation),
     })

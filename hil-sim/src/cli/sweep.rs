@@ -177,7 +177,7 @@ impl Point {
     /// What is found here.
     fn found(&self, method: Method) -> Result<Row, Failure> {
         let found = match &self.crossing {
-            Some(setup) => json!(compute(setup, method, &self.scenario)?),
+            Some(setup) => json!(compute(setup, None, method, &self.scenario)?),
             None => {
                 let summary = session::run(&self.scenario, Options::default())?.summary;
                 let over_ref = summary.max_gap_mm / summary.gap_ref_mm;

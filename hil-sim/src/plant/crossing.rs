@@ -1,4 +1,4 @@
-//! One isolated crossing at constant speed and preload.
+//! One isolated crossing, at constant speed and preload or along a course.
 
 use super::balance::{Axial, Balance, BalanceError};
 use super::ring::{Contact, Motion, Ring, RingParameters};
@@ -50,20 +50,33 @@ pub struct CrossingResult {
 /// # Errors
 /// [`BalanceError`] if no height of the centre balances the preload.
 pub fn cross(case: &CrossingCase) -> Result<CrossingResult, BalanceError> {
+    let speed_mm_s = case.speed_mm_s.abs();
+    cross_along(case, &|_| (speed_mm_s, case.preload_n))
+}
+
+/// The same with the speed, mm/s, and the preload, N, of each place of the axle, mm from the face
+/// outwards; of the case's speed the sign counts.
+///
+/// # Errors
+/// [`BalanceError`] if no height of the centre balances the preload.
+pub fn cross_along(
+    case: &CrossingCase,
+    course: &dyn Fn(f64) -> (f64, f64),
+) -> Result<CrossingResult, BalanceError> {
     let radius = case.ring.radius_mm;
     let forward = case.speed_mm_s > 0.0;
     let wall = Wall::new(vec![Step { position_mm: 0.0, height_mm: case.step_height_mm }]);
     let mut ring = Ring::new(case.ring);
-    let balance =
-        Balance { preload_n: case.preload_n, spring_n_per_mm: 0.0, arm_n: 0.0, axial: case.axial };
     // Far enough before the corner to forget how the wheel was put down, and past
     // it until the patch has left the edge.
     let below = radius - case.step_height_mm;
     let run = (radius * radius - below * below).sqrt();
-    let settle = (8.0 * case.ring.tau_s * case.speed_mm_s.abs()).min(2.0 * radius) + 0.5 * radius;
-    let (start, end) =
-        if forward { (-run - settle, 0.6 * radius) } else { (settle, -run - 0.6 * radius) };
-    let dt = case.stride_mm / case.speed_mm_s.abs();
+    let settle = |speed: f64| (8.0 * case.ring.tau_s * speed).min(2.0 * radius) + 0.5 * radius;
+    let first = if forward { -run } else { 0.0 };
+    let (start, end) = match (forward, settle(course(first).0)) {
+        (true, settle) => (-run - settle, 0.6 * radius),
+        (false, settle) => (settle, -run - 0.6 * radius),
+    };
     let steps = ((end - start).abs() / case.stride_mm).ceil() as usize;
     let dx = case.stride_mm.copysign(case.speed_mm_s);
 
@@ -78,7 +91,10 @@ pub fn cross(case: &CrossingCase) -> Result<CrossingResult, BalanceError> {
         let local = wall.local(x);
         height += base - local.base_mm;
         base = local.base_mm;
-        let motion = Motion { wall: local, height_mm: height, turn_rad: dx / radius, dt_s: dt };
+        let (speed_mm_s, preload_n) = course(x);
+        let dt_s = case.stride_mm / speed_mm_s;
+        let balance = Balance { preload_n, spring_n_per_mm: 0.0, arm_n: 0.0, axial: case.axial };
+        let motion = Motion { wall: local, height_mm: height, turn_rad: dx / radius, dt_s };
         let solved = balance.solve(&mut ring, motion)?;
         height = solved.height_mm;
         ring.commit(&Motion { height_mm: height, ..motion });

@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use super::{good, number, object, refused, rig, stderr, stdout};
+use super::{good, number, object, refused, refused_in, rig, rig_in, stderr, stdout};
 
 /// A crossing on the study's rig.
 fn crossing(speed: f64, preload: f64, more: &[&str]) -> Value {
@@ -35,6 +35,43 @@ fn every_method_prints_the_same_keys_and_the_gap_that_the_ring_was_fitted_to() {
             assert_eq!(value.get("mu_needed").is_some(), more.contains(&"--driven"));
         }
     }
+}
+
+#[test]
+fn along_a_course_that_is_constant_it_is_the_same_and_braking_late_the_gap_is_wider() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let course = |rows: &str| {
+        let text = format!("x_mm,speed_mm_s,preload_n\n{rows}");
+        std::fs::write(directory.path().join("course.csv"), text).expect("written");
+    };
+    let along = |method: &str| {
+        let asked = ["crossing", "--json", "--driven", "--course", "course.csv"];
+        let output = rig_in(directory.path(), &[&asked[..], &["--method", method]].concat());
+        number(&object(&output), "gap_mm")
+    };
+    for method in ["ring", "fixed"] {
+        let steady = good(&[
+            "crossing",
+            "--json",
+            "--driven",
+            "--speed-mm-s",
+            "8",
+            "--preload-n",
+            "45",
+            "--method",
+            method,
+        ]);
+        course("-14,8,45\n");
+        let same = along(method);
+        assert_eq!(same, number(&steady, "gap_mm"), "{method}");
+        // At 8 mm/s only over the last 0.4 mm.
+        course("-13.5,30,45\n-12.4,8,45\n");
+        let late = along(method);
+        assert!(late > same * 1.005 && late < same * 1.06, "{method}: {late} {same}");
+    }
+    course("-14,8,45\n-14,8,45\n");
+    let names = &["course.csv: row 2: x_mm -14"];
+    refused_in(directory.path(), &["crossing", "--course", "course.csv"], names);
 }
 
 #[test]
