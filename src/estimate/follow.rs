@@ -402,7 +402,8 @@ impl Estimator {
         if let Some(mut point) = open.lift {
             if !open.resumed && !open.turned {
                 // How low the wall lies that takes a retracting wheel was not known at the lift.
-                let landing = open.landing.or_else(|| {
+                let slid = open.landing.filter(|landing| landing.slid > Q16::ZERO);
+                let landing = slid.or_else(|| {
                     let landing = open.slide.landing()?;
                     open.slip.lost += landing.slid;
                     open.landing = Some(landing);
