@@ -96,6 +96,8 @@ pub fn animated_svg(recording: &Recording) -> Option<String> {
     for (mut panel, high) in [view.preload(), view.gap()].into_iter().zip(PLOT) {
         panel.x = (from - first, to - first);
         panel.title.truncate("Clearance".len());
+        // As much as fits its height.
+        panel.y_name = panel.y_name.trim_end_matches(" of reference");
         panel.x_name = panel.x_name.filter(|_| down > PLOTS);
         if !scene.measured {
             panel.lines.retain(|line| !matches!(line.look, Look::Measured(_)));
