@@ -7,7 +7,7 @@ use crate::fault::{Fault, Limit};
 use crate::model::plan::PLAN_TICKS;
 use crate::model::{Outcome, Plan, PlanRequest};
 use crate::supervise::Mode;
-use crate::units::{Direction, Millimetres, Newtons, Seconds, Tick, q16, ticks_to_seconds};
+use crate::units::{Direction, Millimetres, Newtons, Q16, Seconds, Tick, q16, ticks_to_seconds};
 
 /// Ticks for which the drive may wait for the preload unreported: a spring that moves with the
 /// wheel takes that long to be followed.
@@ -112,7 +112,13 @@ impl Controller {
         let approach = &mut state.approach;
         let since = approach.standing_since.unwrap_or(tick.now);
         approach.standing_since = reached.then_some(since);
-        approach.waiting = if targets.waiting { approach.waiting + 1 } else { 0 };
+        // A preload that flickers about its reference is still waited for by a wheel at rest.
+        let moves = state.profile.speed() > Q16::ZERO;
+        approach.waiting = match (targets.waiting, moves) {
+            (true, _) => approach.waiting + 1,
+            (false, true) => 0,
+            (false, false) => approach.waiting,
+        };
         if approach.waiting > WAIT_TICKS && !approach.wait_reported {
             approach.wait_reported = true;
             tick.log(Event::Limit(Limit::PreloadWait));
@@ -218,6 +224,27 @@ mod tests {
             assert_eq!(pass.output.events.iter().filter(|e| e.event == wait).count(), 1);
             controller.note_preload(&mut state, pass, cross, &waiting);
             controller.transit(&mut state, pass);
+        });
+        assert_eq!(state.mode, Mode::FaultHold(Fault::PreloadNotReached));
+    }
+
+    #[test]
+    fn a_preload_that_flickers_about_its_reference_is_a_fault_too() {
+        let mut state = running();
+        let targets = |waiting: bool| Targets {
+            speed: Q16::ZERO,
+            preload: q16(48_000_000),
+            ramping: true,
+            begun: Begun::default(),
+            approaching: true,
+            waiting,
+        };
+        within(&sensed(0, 0.0, 0.3), |controller, pass| {
+            for tick in 0..=2 * controller.preload_timeout {
+                let targets = targets(tick % 2 == 0);
+                controller.note_preload(&mut state, pass, targets.preload, &targets);
+                controller.transit(&mut state, pass);
+            }
         });
         assert_eq!(state.mode, Mode::FaultHold(Fault::PreloadNotReached));
     }
