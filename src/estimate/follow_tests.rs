@@ -1,0 +1,145 @@
+//! Following a crossing: steps found, missed and displaced.
+
+use super::super::restore::tests::{estimator, sensed};
+use super::*;
+use crate::units::q16;
+
+#[test]
+fn the_second_step_missed_in_a_row_is_one_too_many() {
+    for (direction, from) in [(Direction::Deploy, 1), (Direction::Retract, 3)] {
+        let mut state = EstimateState { direction, next_step: from, ..EstimateState::default() };
+        // Past every step of the prototype, which are at 18, 40 and 62 mm.
+        state.position = Q16::from_num(if direction == Direction::Deploy { 79 } else { 1 });
+        for (missed, fault) in [(1, None), (2, Some(Fault::StepsLost))] {
+            let found = estimator().watch_expectation(&mut state);
+            assert_eq!(found.limits[..], [Limit::StepMissing]);
+            assert_eq!((state.missed_in_a_row, found.fault), (missed, fault));
+            assert!(found.advanced && found.replan);
+        }
+        assert_eq!(state.next_step, 3 - u8::from(direction == Direction::Retract) * 2);
+    }
+}
+
+#[test]
+fn in_doubt_a_corner_is_left_behind_so_much_later() {
+    let face = q16(18_000_000);
+    for direction in Direction::ALL {
+        for known in [Position::Located, Position::Unconfirmed { searching: false }] {
+            let lift = Some(LiftPoint { face, ..LiftPoint::default() });
+            let crossing = Some(OpenCrossing { step: 1, lift, ..OpenCrossing::default() });
+            let mut state =
+                EstimateState { direction, known, crossing, ..EstimateState::default() };
+            let estimator = estimator();
+            let doubt = if known.is_unsure() { UNSURE_WITHIN } else { Q16::ZERO };
+            let bound = estimator.corner().first_contact(direction.opposite()) + doubt;
+            let watch = &estimator.watch;
+            watch.begin_on_corner(&mut state.watch, direction, 0);
+            let level = sensed(0, 0.05, 0.3);
+            let mut clear = |past: Millimetres| {
+                state.position = face + past * Q16::from_num(direction.sign());
+                estimator.clear_of(&state, &level)
+            };
+            assert!(!clear(bound) && clear(bound + Q16::DELTA), "{direction:?} {known:?}");
+        }
+    }
+}
+
+#[test]
+fn a_step_that_sets_the_position_has_its_crossing_there() {
+    let (sensed, estimator) = (sensed(0, 0.0, 0.3), estimator());
+    let tick = Follow {
+        now: 0,
+        sensed: &sensed,
+        pressed: Q16::ZERO,
+        duty: Q16::ZERO,
+        most_pressed: false,
+        standing_since: None,
+        limited_by: None,
+    };
+    let place = estimator.steps.face(1).expect("a first step");
+    // A search from 13 mm before it.
+    let mut state =
+        EstimateState { known: Position::Searching, next_step: 1, ..EstimateState::default() };
+    state.set_position(sensed.travel, place - q16(13_000_000));
+    state.crossing = Some(OpenCrossing { step: 1, ..OpenCrossing::default() });
+    let lift = Lift { depth: Q16::ZERO, height: Q16::ZERO, gap: Q16::ZERO, distance: Q16::ZERO };
+    estimator.lifted(&mut state, &tick, lift, &mut Findings::default());
+    let point = state.crossing.and_then(|open| open.lift).expect("lifted");
+    assert_eq!((point.face, point.position, point.residual), (place, place, Q16::ZERO));
+    assert!(!estimator.clear_of(&state, &sensed));
+}
+
+#[test]
+fn of_two_steps_in_a_row_that_are_off_alike_the_second_sets_the_position() {
+    let (sensed, estimator) = (sensed(0, 0.0, 0.3), estimator());
+    let place = estimator.steps.face(2).expect("a second step");
+    let off = q16(3_000_000);
+    let mut state = EstimateState { known: Position::Located, ..EstimateState::default() };
+    state.displaced = Some((1, off));
+    state.set_position(sensed.travel, place + off);
+    let lift = Some(LiftPoint { face: place + off, residual: off, ..LiftPoint::default() });
+    state.crossing = Some(OpenCrossing { step: 2, lift, ..OpenCrossing::default() });
+    let mut found = Findings::default();
+    estimator.close(&mut state, &sensed, &estimator.as_table(Q16::ZERO), &mut found);
+    assert_eq!((state.position, state.displaced), (place, None));
+    assert!(estimator.sigma(&state) < q16(200_000));
+    let (closed, _) = found.closed.expect("closed");
+    assert_eq!(closed.lift.map(|point| point.face), Some(place));
+}
+
+#[test]
+fn a_step_off_its_height_is_reported_and_its_gap_learned_from_as_the_table_has_it() {
+    let (sensed, estimator) = (sensed(0, 0.0, 0.3), estimator());
+    for (height, reported) in [(4_100_000, false), (4_200_000, true), (3_500_000, true)] {
+        let mut state = EstimateState { known: Position::Located, ..EstimateState::default() };
+        let face = estimator.steps.face(1).expect("a first step");
+        let lift = Some(LiftPoint { face, ..LiftPoint::default() });
+        state.crossing = Some(OpenCrossing { step: 1, lift, ..OpenCrossing::default() });
+        let (gap, as_table) = (q16(2_700_000), q16(2_600_000));
+        let measured =
+            Measured { height: q16(height), gap, as_table, shift: Q16::ZERO, plausible: true };
+        let mut found = Findings::default();
+        estimator.close(&mut state, &sensed, &measured, &mut found);
+        assert_eq!(found.limits.contains(&Limit::StepHeight), reported, "{height}");
+        let (closed, trusted) = found.closed.expect("closed");
+        let learned = closed.lift.expect("lifted").gap;
+        assert_eq!((closed.gap, learned, trusted), (gap, as_table, true));
+        assert_eq!(state.raised, q16(height) - q16(4_000_000));
+    }
+}
+
+#[test]
+fn a_displaced_step_is_early_where_it_comes_before_its_place() {
+    for (direction, residual, limit) in [
+        (Direction::Deploy, -2, Limit::StepEarly),
+        (Direction::Deploy, 2, Limit::StepLate),
+        (Direction::Retract, 2, Limit::StepEarly),
+        (Direction::Retract, -2, Limit::StepLate),
+    ] {
+        let state = EstimateState { direction, ..EstimateState::default() };
+        let mut found = Findings::default();
+        report_displaced(&state, Q16::from_num(residual), &mut found);
+        assert_eq!(found.limits[..], [limit]);
+    }
+}
+
+#[test]
+fn a_tread_is_compared_on_a_wall_alone() {
+    // Pressed with 40 N, and the compression sensor reads nothing.
+    let strange = SensedState { preload_filtered: q16(40_000_000), ..sensed(0, 0.0, 0.0) };
+    let reported = |contact: Contact, known: Position, position: f64| {
+        let mut state = EstimateState { known, ..EstimateState::default() };
+        state.position = Q16::from_num(position);
+        state.watch.contact = contact;
+        let estimator = estimator();
+        let report = |tick: &i32| estimator.rest(&mut state, &strange, Q16::ZERO, *tick <= 1);
+        (1..500).filter(report).count()
+    };
+    assert_eq!(reported(Contact::Wall, Position::Located, 0.0), 1);
+    assert_eq!(reported(Contact::Both, Position::Located, 0.0), 0);
+    assert_eq!(reported(Contact::Leaving, Position::Located, 0.0), 0);
+    // On an edge the tread is pressed deeper, not less.
+    assert_eq!(reported(Contact::Wall, Position::Searching, 0.0), 1);
+    // The corner at 18 mm may carry a part.
+    assert_eq!(reported(Contact::Wall, Position::Located, 12.0), 0);
+}
