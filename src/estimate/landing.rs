@@ -25,9 +25,9 @@ const LANDED: Millimetres = q16(200_000);
 /// that slides is stiffer, so the first is too little; the wall that carries makes the second too
 /// much. Least squares over 34 slides of drawn rigs: what is left has one sigma of 0.15 mm.
 const BY_LARGEST: Ratio = q16(750_000);
-/// Travels of the tread by which the face moves at most while a wall takes a wheel that rolls: twice
-/// what a sensor of the mean compression makes of a creeping wheel. Faster is a slide, even if the
-/// wall takes the wheel in the middle of it.
+/// Travels of the tread by which the face moves at most while a wall takes a wheel that rolls: chosen
+/// on drawn rigs, twice what a sensor of the mean compression makes of a creeping wheel there. Faster
+/// is a slide, even if the wall takes the wheel in the middle of it.
 const ROLLS: Ratio = q16(3_000_000);
 /// Part of a slide by which it goes on while the edge hands the load over to the wall, likewise.
 const GOES_ON: Ratio = q16(600_000);
@@ -58,8 +58,8 @@ pub struct Landing {
 }
 
 impl Landing {
-    /// One sigma of the slide, mm: what is left of the least squares, and how the face moves without
-    /// one.
+    /// One sigma of the slide, mm: what is left of the least squares, and a part that is chosen on
+    /// drawn rigs.
     pub fn sigma(&self) -> Millimetres {
         q16(150_000) + self.slid * q16(200_000)
     }

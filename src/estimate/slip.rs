@@ -20,8 +20,9 @@ const MOST: Millimetres = q16(800_000);
 /// Windows without slip after which the wheel grips again.
 const GRIPS_AFTER: u8 = 2;
 
-/// One sigma of a measured slip, mm, and the part of it that adds: three quarters of a window, which
-/// hide at its ends, and how the face moves without slip.
+/// One sigma of a measured slip, mm, and the part of it that adds: what a window hides at its ends,
+/// and how the face moves without slip. Chosen on drawn rigs, wider than the 0.25 mm that slips there
+/// are off by.
 const WINDOW_SIGMA: Millimetres = q16(300_000);
 const PART_SIGMA: Ratio = q16(200_000);
 

@@ -32,10 +32,11 @@ const FIRST_SLOPE: Q16 = q16(30_000_000);
 const INFEASIBLE: Seconds = q16(1_000_000_000);
 /// Windows that are tried for a tread that no compared one suits.
 const SLOWER: u32 = 5;
-/// Time that a gap beyond its target counts as, s for each part of it: 6 s for a hundredth.
+/// Time that a gap beyond its target counts as, s for each part of it: 6 s for a
+/// hundredth. Chosen on drawn rigs.
 const PENALTY: Seconds = q16(600_000_000);
 /// Slowest speeds that are tried where none keeps the gap, as parts of the range: at faster ones the
-/// gap of coupled rubber grows more than the rollout has it.
+/// gap of coupled rubber grows more than the rollout has it. Chosen on drawn rigs.
 const TOO_WIDE: [Ratio; 2] = [q16(25_000), q16(50_000)];
 
 /// A search for a course; it pauses every few strides.
