@@ -4,7 +4,7 @@
 pub mod hil;
 
 use crate::estimate::Place;
-use crate::log::Identity;
+use crate::log::{Identity, Record};
 use crate::restart::DriveSnapshot;
 use crate::sense::raw::{AdcCode, AngleFrame, BridgeCodes, BusFault, EncoderCount};
 use crate::supervise::Command;
@@ -107,6 +107,9 @@ pub trait Journal {
 
     /// Writes what the control tick took since the last such line, as [`Journal::write`] does.
     fn write_cycles(&mut self, _at: Tick, _cycles: TickCycles) {}
+
+    /// Sees every tick's record before it is sent.
+    fn see(&mut self, _record: &Record) {}
 
     /// Identity for the head of the binary log.
     fn identity(&self) -> Identity {

@@ -5,6 +5,7 @@
 //! code is 0 on success, 1 if a run, log or check failed, 2 for bad input; an error is one
 //! line.
 
+mod accept;
 pub mod bringup;
 pub mod campaign;
 pub mod capture;
@@ -56,6 +57,7 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Verb {
     Deploy(deploy::Args),
+    Accept(accept::Args),
     Bringup(bringup::Args),
     Capture(capture::Args),
     Completions(completions::Args),
@@ -109,6 +111,7 @@ impl Verb {
     fn run(&self) -> Result<Outcome, Failure> {
         match self {
             Self::Deploy(args) => deploy::run(args),
+            Self::Accept(args) => accept::run(args),
             Self::Bringup(args) => bringup::run(args),
             Self::Capture(args) => capture::run(args),
             Self::Completions(args) => completions::run(args),

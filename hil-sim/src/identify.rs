@@ -1,5 +1,6 @@
 //! Identifies the parameters of a rig from its logs.
 
+pub mod accept;
 pub mod actuator;
 pub mod contact;
 pub mod coordinates;

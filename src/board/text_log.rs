@@ -1,14 +1,16 @@
 //! Log entries as lines on the debug probe, and the binary log beside them.
 
 use defmt::{error, info, warn};
+use heapless::Vec;
 use interstage::estimate::ContactStage;
 use interstage::hal::Journal;
-use interstage::log::Identity;
+use interstage::log::{Identity, Record};
 use interstage::model::LimitedBy;
 use interstage::supervise::{Mode, ServiceDuties};
 use interstage::tasks::TickCycles;
 use interstage::tick::{CrossingRecord, Entry, Event};
 use interstage::units::{Direction, Duty, Q16, Tick};
+use micromath::statistics::{Mean, StdDev};
 
 use super::rtt::{self, Frames};
 
@@ -17,12 +19,17 @@ pub(crate) struct TextLog {
     frames: Frames,
     identity: Identity,
     lost: u32,
+    /// Raw codes of preload and compression sensor while their zeros are taken.
+    zeroing: [Vec<u16, ZERO_CODES>; 2],
 }
+
+/// Most codes behind the line on the zeros: as many as are averaged.
+const ZERO_CODES: usize = 256;
 
 impl TextLog {
     /// Text on the log's channel, frames on their own.
     pub(crate) fn new(frames: Frames) -> Self {
-        Self { frames, identity: Identity::default(), lost: 0 }
+        Self { frames, identity: Identity::default(), lost: 0, zeroing: [const { Vec::new() }; 2] }
     }
 
     /// Sets the head of the binary log; before the journal starts.
@@ -38,6 +45,26 @@ impl Journal for TextLog {
 
     fn write_cycles(&mut self, at: Tick, TickCycles { mean, most }: TickCycles) {
         info!("[{=u32} ms] tick: {=u32} cycles on average, {=u32} at most", at, mean, most);
+    }
+
+    fn see(&mut self, record: &Record) {
+        let [preload, compression] = &mut self.zeroing;
+        if record.telemetry.mode == Mode::Zero {
+            // Beyond the last one none is kept.
+            let _ = preload.push(record.codes[1]);
+            let _ = compression.push(record.codes[2]);
+        } else if !preload.is_empty() {
+            info!(
+                "[{=u32} ms] zero: preload {=f32} +- {=f32}, compression {=f32} +- {=f32} codes",
+                record.telemetry.at,
+                preload.iter().copied().map(f32::from).mean(),
+                preload.as_slice().stddev(),
+                compression.iter().copied().map(f32::from).mean(),
+                compression.as_slice().stddev()
+            );
+            preload.clear();
+            compression.clear();
+        }
     }
 
     fn identity(&self) -> Identity {

@@ -140,6 +140,7 @@ pub async fn journal(
                 }
             }
             Ok(Either::Second(record)) => {
+                journal.see(&record);
                 let mut send = |frame: &[u8]| journal.send(frame);
                 if let Ok((at, request)) = exchange.logged_request.try_receive() {
                     encoder.request(at, &request, &mut send);

@@ -37,6 +37,8 @@ pub struct Trajectory {
     series: [Vec<f64>; 4],
     /// Largest friction utilisation.
     pub most_utilisation: f64,
+    /// Number of each step crossed, from 1, and its gap, mm.
+    pub gaps_mm: Vec<(usize, f64)>,
 }
 
 /// A record with what the forward model needs of it.
@@ -94,13 +96,16 @@ impl Run {
         let mut rig = VirtualRig::new(plant, self.start_mm, preload(first), dt_s);
         let count = (last - first) / STEP + 1;
         let series = [(); 4].map(|()| Vec::with_capacity(count));
-        let mut trajectory = Trajectory { first, series, most_utilisation: 0.0 };
+        let mut trajectory =
+            Trajectory { first, series, most_utilisation: 0.0, gaps_mm: Vec::new() };
         trajectory.note(&rig);
         for to in (first..=last).step_by(STEP).skip(1) {
             let turn = traces.turn_rad[to] - traces.turn_rad[to - STEP];
             rig.follow(radius * turn / dt_s, preload(to), dt_s)?;
             trajectory.note(&rig);
         }
+        let crossings = rig.ledger().crossings().iter();
+        trajectory.gaps_mm = crossings.map(|crossing| (crossing.index, crossing.gap_mm)).collect();
         Ok(trajectory)
     }
 
@@ -182,7 +187,7 @@ impl Trajectory {
     fn map(&self, of: impl Fn(usize, usize, f64) -> f64) -> Self {
         let each =
             |i: usize| self.series[i].iter().enumerate().map(|(k, v)| of(i, k, *v)).collect();
-        Self { series: std::array::from_fn(each), ..*self }
+        Self { series: std::array::from_fn(each), gaps_mm: Vec::new(), ..*self }
     }
 
     /// This with a part of a change added.

@@ -115,8 +115,25 @@ pub struct Identification {
     pub scenario: Scenario,
 }
 
+/// The fit behind a result.
+pub(super) struct Fit {
+    pub(super) coordinates: Coordinates,
+    pub(super) runs: Vec<Run>,
+    pub(super) contact: Contact,
+}
+
 /// Identifies the rig of `scenario` from its logs.
 pub fn identify(records: &[Record], scenario: &Scenario) -> Result<Identification, IdentifyError> {
+    let (found, Fit { coordinates, runs, contact }) = fitted(records, scenario)?;
+    contact::agree(&runs, &coordinates, &contact)?;
+    Ok(found)
+}
+
+/// The same with the fit.
+pub(super) fn fitted(
+    records: &[Record],
+    scenario: &Scenario,
+) -> Result<(Identification, Fit), IdentifyError> {
     for record in records {
         let (its, ours) = (&record.scenario.rig, &scenario.rig);
         if its.rig != ours.rig || its.sense != ours.sense || its.drive != ours.drive {
@@ -129,7 +146,6 @@ pub fn identify(records: &[Record], scenario: &Scenario) -> Result<Identificatio
     let runs: Vec<Run> =
         records.iter().map(|record| Run::of(record, &coordinates)).collect::<Result<_, _>>()?;
     let contact = contact::fit(&runs, &coordinates)?;
-    contact::agree(&runs, &coordinates, &contact)?;
     let actuator = actuator::fit(records, &runs, &contact.trajectories, contact.x[RADIUS])?;
     let report = Document { scenario, coordinates: &coordinates, runs: &runs, contact: &contact };
     let mut parameters = report.contact_parameters();
@@ -142,14 +158,15 @@ pub fn identify(records: &[Record], scenario: &Scenario) -> Result<Identificatio
     let is_complete = missing.is_empty();
     let compared = contact.residuals.iter().flatten().chain(&actuator.residuals).map(Vec::len);
     let fitted = contact.x.len() + actuator.x.len();
-    Ok(Identification {
+    let found = Identification {
         scenario: updated(scenario, &parameters),
         residuals: report.residuals(&actuator),
         degrees_of_freedom: compared.sum::<usize>().saturating_sub(fitted),
         notes: [missing, report.notes(&parameters)].concat(),
         is_complete,
         parameters,
-    })
+    };
+    Ok((found, Fit { coordinates, runs, contact }))
 }
 
 struct Document<'a> {
@@ -314,19 +331,11 @@ fn updated(scenario: &Scenario, parameters: &[Parameter]) -> Scenario {
     let mut table = Table::try_from(scenario).expect("a scenario is always TOML");
     let mut heights = Vec::new();
     for Parameter { name, value, .. } in parameters.iter().filter(|p| p.identified) {
-        // What is no key of a scenario has no section.
-        let Some((section, name)) = name.split_once('.') else { continue };
-        let (name, index) = name.split_once('[').unwrap_or((name, ""));
-        if name == "step_height_mm" {
+        if name.starts_with("rig.step_height_mm") {
             heights.push(value);
         }
-        let index = index.trim_end_matches(']').parse().ok().and_then(|i: usize| i.checked_sub(1));
-        match (table.get_mut(section).and_then(|keys| keys.get_mut(name)), index) {
-            (Some(Value::Array(list)), Some(index)) => {
-                list.get_mut(index).into_iter().for_each(|place| *place = (*value).into());
-            }
-            (Some(place), None) => *place = (*value).into(),
-            _ => {}
+        if let Some(place) = place_of(&mut table, name) {
+            *place = (*value).into();
         }
     }
     let mut scenario: Scenario = table.try_into().expect("numbers replace numbers");
@@ -336,6 +345,19 @@ fn updated(scenario: &Scenario, parameters: &[Parameter]) -> Scenario {
             heights.iter().copied().sum::<f64>() / heights.len() as f64;
     }
     scenario
+}
+
+/// Where a scenario has the value of this parameter; none for what is no key. All steps have one
+/// height.
+pub(super) fn place_of<'a>(table: &'a mut Table, name: &str) -> Option<&'a mut Value> {
+    let (section, name) = name.split_once('.')?;
+    let (name, index) = name.split_once('[').unwrap_or((name, ""));
+    match table.get_mut(section)?.get_mut(name)? {
+        Value::Array(list) => {
+            list.get_mut(index.trim_end_matches(']').parse::<usize>().ok()?.checked_sub(1)?)
+        }
+        value => Some(value),
+    }
 }
 
 impl Identification {

@@ -4,11 +4,14 @@
 //! them where only a tolerance is known. The shipping controller, which takes it for the
 //! nominal rig, makes three deployments; their sensor readings alone are handed on.
 
-use hil_sim::identify::record::{Reader, Record};
+use hil_sim::identify::accept::accept;
+use hil_sim::identify::record::{Reader, Record, TICK_S};
 use hil_sim::identify::result::identify;
 use hil_sim::plant::draw::PlantParameters;
+use hil_sim::plant::rig::VirtualRig;
 use hil_sim::plant::sensors::Sensors;
-use hil_sim::scenario::{ControllerKind, Scenario};
+use hil_sim::record::Summary;
+use hil_sim::scenario::{ControllerKind, Direction, Scenario};
 use hil_sim::session::{Options, RunningRig, Session, drives, read};
 use interstage::sense::raw::{Sample, SensorFrame};
 use interstage::supervise::{Command, Mode};
@@ -115,13 +118,34 @@ fn log(index: usize, wide: &Scenario, zeros: (f64, f64)) -> Record {
     let mut scenario = wide.clone();
     scenario.run.controller = controller;
     scenario.rig.preload.cruise_n *= part;
-    let mut session = Session::new(&scenario, Options::default()).expect("a sound scenario");
+    // The log names the nominal rig; the draw is hidden.
+    let plant = scenario.plant();
+    scenario.run.seed = 0;
+    driven(name, scenario, plant, wide.run.seed.wrapping_mul(31) + 1 + index as u64, zeros).0
+}
+
+/// A deployment of this plant by a controller that believes in the rig of the scenario.
+fn driven(
+    name: &str,
+    scenario: Scenario,
+    plant: PlantParameters,
+    noise: u64,
+    zeros: (f64, f64),
+) -> (Record, Summary) {
     // Sensors of their own, or every log of a rig would have the same noise.
-    let noise = wide.run.seed.wrapping_mul(31).wrapping_add(1 + index as u64);
-    let mut sensors = Sensors::new(session.plant().parameters().sensors.clone(), noise);
+    let mut sensors = Sensors::new(plant.sensors.clone(), noise);
+    let session = Session::new(&scenario, Options::default()).expect("a sound scenario");
+    let (start_mm, preload_n, command) = match scenario.run.direction {
+        Direction::Deploy => (0.0, 0.0, Command::Start),
+        Direction::Retract => {
+            (scenario.rig.rig.travel_mm, scenario.rig.preload.cruise_n, Command::Retract)
+        }
+    };
+    let rig = VirtualRig::new(plant, start_mm, preload_n, TICK_S);
+    let mut session = session.with_plant(|plant| *plant = rig);
     let (mut arm, mut samples) = (None, Vec::new());
     let mut reader = Reader::new(&scenario);
-    let mut start = Some(Command::Start);
+    let mut start = Some(command);
     while samples.len() < LONGEST
         && !matches!(session.mode(), Mode::Complete(_) | Mode::FaultHold(_))
     {
@@ -144,7 +168,38 @@ fn log(index: usize, wide: &Scenario, zeros: (f64, f64)) -> Record {
         sample.compression_mm += zeros.1;
         samples.push((at, sample));
     }
-    // The log names the nominal rig; the draw is hidden.
-    scenario.run.seed = 0;
-    Record::new(name, scenario, samples).expect("a sound record")
+    let summary = session.finish(0.0).summary;
+    (Record::new(name, scenario, samples).expect("a sound record"), summary)
+}
+
+/// What is wrong with a rig that was identified, if anything, and the first word of a reason that
+/// names it.
+pub(crate) type Wrong = (&'static str, fn(&mut PlantParameters));
+
+/// Whether a hidden rig is accepted with the parameters that its logs gave, and why not, after
+/// this has changed.
+pub(crate) fn accepted(seed: u64, changes: &[Wrong]) -> Vec<Vec<String>> {
+    let scenario = widened(seed);
+    let records: Vec<Record> =
+        (0..EXPERIMENTS.len()).map(|index| log(index, &scenario, (0.0, 0.0))).collect();
+    let found = identify(&records, &records[0].scenario).expect("a sound rig");
+    let one = |(n, (_, change)): (usize, &Wrong)| {
+        let mut plant = scenario.plant();
+        change(&mut plant);
+        // A deployment and the way back.
+        let (records, summaries): (Vec<Record>, Vec<Summary>) =
+            [Direction::Deploy, Direction::Retract]
+                .into_iter()
+                .map(|direction| {
+                    let mut scenario = found.scenario.clone();
+                    scenario.run.direction = direction;
+                    let noise =
+                        seed * 100 + 2 * n as u64 + u64::from(direction == Direction::Deploy);
+                    driven("last", scenario, plant.clone(), noise, (0.0, 0.0))
+                })
+                .unzip();
+        let result = accept(&records, &summaries, &[]);
+        result.map_or_else(|error| vec![error.to_string()], |result| result.reasons)
+    };
+    changes.iter().enumerate().map(one).collect()
 }

@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 use crate::cli::{code, object, refused_in, rig_in, stderr};
 use hidden::Line;
 use hil_sim::identify::published::{self, AMPLITUDE_MM};
+use hil_sim::plant::wall::{Step, Wall};
 use hil_sim::scenario::Scenario;
 use hil_sim::testing::long;
 
@@ -43,6 +44,40 @@ fn hidden_parameters_lie_within_their_intervals() {
         let median = line.half_widths[line.half_widths.len() / 2];
         assert!(median < 0.06 * value, "{name}: {line:?}");
     }
+}
+
+/// Rigs as identified are accepted; each that has changed since is not, by its name.
+#[test]
+fn a_rig_is_accepted_as_identified_and_not_once_it_has_changed() {
+    let changes: [hidden::Wrong; 8] = [
+        ("", |_| ()),
+        ("plant.mu", |p| p.mu *= 0.75),
+        ("plant.mu", |p| p.mu *= 1.25),
+        ("tread.k_inf", |p| (p.ring.k_inf, p.ring.k_0) = (1.2 * p.ring.k_inf, 1.2 * p.ring.k_0)),
+        ("tread.k_inf", |p| (p.ring.k_inf, p.ring.k_0) = (0.8 * p.ring.k_inf, 0.8 * p.ring.k_0)),
+        ("rig.step_positions_mm[1]", |p| p.wall = moved(&p.wall, [2.0; 3])),
+        ("rig.step_positions_mm[2]", |p| p.wall = moved(&p.wall, [0.0, 1.0, 0.0])),
+        ("tread.k_inf", |p| p.sensors.preload_sensor_gain *= 1.1),
+    ];
+    let seeds = if long() { 20 } else { 1 };
+    let mut refused = Vec::new();
+    for seed in 111..111 + seeds {
+        let reasons = hidden::accepted(seed, &changes);
+        refused.extend((!reasons[0].is_empty()).then(|| (seed, reasons[0].clone())));
+        for ((name, _), why) in changes.iter().zip(&reasons).skip(1) {
+            // Where the wheel slips, the slip is what is named.
+            let named = |why: &String| {
+                why.starts_with(name) || *name == "plant.mu" && why.contains("slipped by")
+            };
+            assert!(why.iter().any(named), "seed {seed}, {name}: {why:?}");
+        }
+    }
+    assert!(20 * refused.len() as u64 <= seeds, "{refused:#?}");
+}
+
+fn moved(wall: &Wall, by_mm: [f64; 3]) -> Wall {
+    let steps = wall.steps().iter().zip(by_mm);
+    Wall::new(steps.map(|(s, by)| Step { position_mm: s.position_mm + by, ..*s }).collect())
 }
 
 /// Least squares of three gaps: better than the presets' tread by the same ring, and the

@@ -1,0 +1,246 @@
+//! Acceptance: logs of a rig against the virtual rig with the parameters that the controller had.
+
+use serde::Serialize;
+use toml::Table;
+
+use super::coordinates::{FRICTION, LOAD, STEPS, STIFFENING, STIFFNESS, TAU};
+use super::forward::{CHANNELS, quotient};
+use super::noise::Noise;
+use super::record::Record;
+use super::result::{Fit, Identification, fitted, place_of};
+use super::{IdentifyError, contact};
+use crate::record::Summary;
+use crate::scenario::Scenario;
+use crate::table::number;
+
+/// Part of the gap by which two ways of knowing it may differ: the verdict's tolerance.
+const GAP: f64 = 0.03;
+
+/// Slip that a sound run does not have, as the controller measures it, mm.
+const SLIP_MM: f64 = 0.5;
+
+/// How far a quantity of the logs may be from the virtual rig's, root mean square. Each is about
+/// what a rig shows whose parameters are each half their [`LIMITS`] off.
+const RESIDUALS: [(&str, f64); 4] =
+    [("compression", 0.03), ("arm angle", 1.5), ("drive effort", 1.5), ("preload", 0.2)];
+
+/// How far what the logs show may be from what the controller was told.
+enum Limit {
+    /// Part of the stated value.
+    Part(f64),
+    /// In the key's unit.
+    Of(f64),
+}
+
+/// Name of what is told over nominal.
+const DRIVE: &str = "drive force over nominal";
+
+/// By the start of the name. A tread's key changes the gap by 1 % at its limit. Load and friction:
+/// 3 % and the 0.15 of friction that separate the default rig from where it begins to slip. Places:
+/// what the end of travel has. Pre-tightener: half a newton at full rate. Scale of the preload
+/// sensor: what `sense.preload_error` has by default, found by tread, rate, spring and drive alike.
+const LIMITS: [(&str, Limit); 12] = [
+    ("tread.k_inf_pa_per_m", Limit::Part(0.06)),
+    ("tread.stiffening", Limit::Part(0.08)),
+    ("tread.tau_s", Limit::Part(0.2)),
+    ("plant.mu", Limit::Part(0.12)),
+    ("plant.top_load_n", Limit::Part(0.1)),
+    (DRIVE, Limit::Part(0.04)),
+    ("rig.step_positions_mm", Limit::Of(0.5)),
+    ("rig.step_height_mm", Limit::Of(0.1)),
+    ("preload.delay_s", Limit::Of(0.02)),
+    ("preload.lag_s", Limit::Of(0.02)),
+    ("preload.slew_n_per_s", Limit::Part(0.06)),
+    ("preload.spring_n_per_mm", Limit::Part(0.06)),
+];
+
+/// A quantity of the logs beside the virtual rig's.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Residual {
+    pub quantity: &'static str,
+    pub unit: &'static str,
+    /// Root mean square of the difference.
+    pub rms: f64,
+    pub limit: f64,
+    pub ok: bool,
+}
+
+/// A parameter as stated and as the logs show it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Key {
+    pub key: String,
+    pub unit: &'static str,
+    pub stated: f64,
+    pub found: f64,
+    /// Ends of its 95 % interval.
+    pub low: Option<f64>,
+    pub high: Option<f64>,
+    /// Largest difference.
+    pub limit: f64,
+    pub ok: bool,
+}
+
+/// The gap of a crossing by two ways.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Gap {
+    pub log: String,
+    /// Number of the step, from 1.
+    pub step: usize,
+    /// By the controller; none if it did not measure it.
+    pub measured_mm: Option<f64>,
+    /// By another way; none if the ring did not cross there.
+    pub independent_mm: Option<f64>,
+    /// What that is: `reading`, typed in, or `ring`, the virtual rig's tread driven by the log.
+    pub by: Option<&'static str>,
+    pub ok: bool,
+}
+
+/// The result.
+#[derive(Clone, Debug, Serialize)]
+pub struct Acceptance {
+    pub passed: bool,
+    pub residuals: Vec<Residual>,
+    pub keys: Vec<Key>,
+    pub gap: Vec<Gap>,
+    /// What speaks against it, in sentences.
+    pub reasons: Vec<String>,
+}
+
+/// Compares logs of one rig with the parameters in them. `readings` are gaps by a camera or a feeler
+/// gauge: step, from 1, and mm.
+pub fn accept(
+    records: &[Record],
+    runs: &[Summary],
+    readings: &[(usize, f64)],
+) -> Result<Acceptance, IdentifyError> {
+    let first = records.first().ok_or_else(|| IdentifyError::NoFit("there are no logs".into()))?;
+    if let Some(other) = records.iter().find(|other| other.scenario.rig != first.scenario.rig) {
+        let why = format!("its controller had other parameters than that of {}", first.name);
+        return Err(IdentifyError::Log(other.name.clone(), why));
+    }
+    let (found, fit) = fitted(records, &first.scenario)?;
+    let mut reasons = found.notes[..records.iter().map(|of| of.missing.len()).sum()].to_vec();
+    reasons.extend(records.iter().zip(runs).filter_map(|(record, run)| {
+        let fault = run.faults.first().map(|fault| fault.text.clone());
+        let short = (!run.completed).then(|| "it did not complete".to_owned());
+        Some(format!("{}: {}", record.name, fault.or(short)?))
+    }));
+    for (record, run) in records.iter().zip(runs) {
+        let slips = run.crossings.iter().filter_map(|line| Some((line, line.slip_measured_mm?)));
+        reasons.extend(slips.filter(|(_, slip)| slip.abs() > SLIP_MM).map(|(line, slip)| {
+            format!("{}: slipped by {slip:.2} mm at step {}", record.name, line.index)
+        }));
+    }
+    let same = contact::agree(&fit.runs, &fit.coordinates, &fit.contact);
+    reasons.extend(same.err().map(|error| error.to_string()));
+    let residuals = residuals(&found, &fit)?;
+    let keys = keys(&found, &first.scenario);
+    let gap = gaps(records, runs, &fit, readings);
+    for of in residuals.iter().filter(|of| !of.ok) {
+        let Residual { quantity, unit, rms, limit, .. } = of;
+        reasons.push(format!(
+            "{quantity}: {rms:.3} {unit} from the virtual rig's, at most {limit} {unit}"
+        ));
+    }
+    for of in keys.iter().filter(|of| !of.ok) {
+        let Key { key, unit, .. } = of;
+        let [found, stated, limit] = [of.found, of.stated, of.limit].map(brief);
+        reasons.push(format!(
+            "{key}: {found} {unit} in the logs, {stated} stated, at most {limit} apart"
+        ));
+    }
+    for of in gap.iter().filter(|of| !of.ok) {
+        let Gap { log, step, measured_mm, independent_mm, by, .. } = of;
+        let mm = |gap: Option<f64>| gap.map_or("none".to_owned(), |gap| format!("{gap:.3} mm"));
+        reasons.push(format!(
+            "{log}: gap at step {step}: {} by the controller, {} by the {}",
+            mm(*measured_mm),
+            mm(*independent_mm),
+            by.unwrap_or("ring")
+        ));
+    }
+    Ok(Acceptance { passed: reasons.is_empty(), residuals, keys, gap, reasons })
+}
+
+/// A number as a table shows it.
+pub fn brief(value: f64) -> String {
+    if value.abs() >= 1e4 { format!("{value:.3e}") } else { number(value, 3) }
+}
+
+/// What the virtual rig with the stated parameters leaves; sensors and wheel within their
+/// tolerances, as found. The preload is the pre-tightener's as found: its keys are judged.
+fn residuals(found: &Identification, fit: &Fit) -> Result<Vec<Residual>, IdentifyError> {
+    let mut x = fit.contact.x.clone();
+    let stated = [STIFFNESS, STIFFENING, TAU, FRICTION, LOAD].into_iter().chain(STEPS..x.len());
+    for index in stated {
+        x[index] = fit.coordinates.priors()[index].mean;
+    }
+    let mut left: [Vec<f64>; 3] = Default::default();
+    for run in &fit.runs {
+        let at = run
+            .simulate(&fit.coordinates, &x)
+            .map_err(|error| IdentifyError::Log(run.name.clone(), error.to_string()))?;
+        let remaining = quotient(&run.predicted(&at, &x), &run.measured(), 1.0);
+        left.iter_mut().zip(remaining).for_each(|(left, of)| left.extend(of));
+    }
+    let preload = found.residuals.iter().filter(|of| of.channel == "preload");
+    let preload: Vec<f64> =
+        preload.flat_map(|of| of.series.iter().map(|(_, left)| *left)).collect();
+    let units = CHANNELS.map(|(_, unit)| unit).into_iter().chain(["N"]);
+    let rows = left.into_iter().chain([preload]).zip(RESIDUALS).zip(units);
+    let row = |((values, (quantity, limit)), unit): ((Vec<f64>, _), _)| {
+        let rms = Noise::of(&values).deviation;
+        Residual { quantity, unit, rms, limit, ok: rms <= limit }
+    };
+    Ok(rows.map(row).collect())
+}
+
+fn keys(found: &Identification, scenario: &Scenario) -> Vec<Key> {
+    let mut table = Table::try_from(scenario).expect("a scenario is always TOML");
+    let mut key = |of: &super::result::Parameter| {
+        let (_, limit) = LIMITS.iter().find(|(name, _)| of.name.starts_with(name))?;
+        let stated = place_of(&mut table, &of.name).map_or(Some(1.0), |value| {
+            value.as_float().or_else(|| value.as_integer().map(|whole| whole as f64))
+        })?;
+        let limit = match limit {
+            Limit::Part(part) => part * stated.abs(),
+            Limit::Of(limit) => *limit,
+        };
+        // The drive's force is known by its tolerance.
+        let shown = of.identified || of.name == DRIVE;
+        let ok = shown && (of.value - stated).abs() <= limit;
+        Some(Key {
+            key: of.name.clone(),
+            unit: of.unit,
+            stated,
+            found: of.value,
+            low: of.low,
+            high: of.high,
+            limit,
+            ok,
+        })
+    };
+    found.parameters.iter().filter_map(&mut key).collect()
+}
+
+/// Every crossing's gap by a second way: a reading if there is one, else the ring that followed the
+/// log, its tread as the logs show it. A gap over the reference is none to accept.
+fn gaps(records: &[Record], runs: &[Summary], fit: &Fit, readings: &[(usize, f64)]) -> Vec<Gap> {
+    let mut all = Vec::new();
+    for ((record, run), at) in records.iter().zip(runs).zip(&fit.contact.trajectories) {
+        for line in &run.crossings {
+            let step = usize::from(line.index);
+            let of_step = |(of, _): &&(usize, f64)| *of == step;
+            let reading = readings.iter().find(of_step).map(|of| (of.1, "reading"));
+            let ring = at.gaps_mm.iter().find(of_step).map(|of| (of.1, "ring"));
+            let (independent_mm, by) = reading.or(ring).unzip();
+            let measured_mm = line.gap_measured_mm;
+            let ok = measured_mm.zip(independent_mm).is_some_and(|(measured, other)| {
+                (measured - other).abs() <= GAP * other && measured <= (1.0 + GAP) * run.gap_ref_mm
+            });
+            let log = record.name.clone();
+            all.push(Gap { log, step, measured_mm, independent_mm, by, ok });
+        }
+    }
+    all
+}
