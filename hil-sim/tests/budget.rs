@@ -71,15 +71,3 @@ fn the_project_keeps_to_its_budget_of_lines() {
         );
     }
 }
-
-#[test]
-fn a_module_of_tests_counts_up_to_its_brace() {
-    let text =
-        "fn a() {}\n#[cfg(test)]\npub(crate) mod tests {\n    fn b() {\n    }\n}\nfn c() {}\n";
-    assert_eq!(inline_tests(text), 4);
-    for none in
-        ["#[cfg(test)]\nmod tests;\n", "mod tests {\n}\n", "#[cfg(test)]\nuse a;\nmod b {\n}\n"]
-    {
-        assert_eq!(inline_tests(none), 0, "{none}");
-    }
-}

@@ -11,6 +11,7 @@ use interstage::tasks::TickCycles;
 use interstage::tick::{CrossingRecord, Entry, Event};
 use interstage::units::{Direction, Duty, Q16, Tick};
 use micromath::statistics::{Mean, StdDev};
+use static_cell::ConstStaticCell;
 
 use super::rtt::{self, Frames};
 
@@ -20,7 +21,7 @@ pub(crate) struct TextLog {
     identity: Identity,
     lost: u32,
     /// Raw codes of preload and compression sensor while their zeros are taken.
-    zeroing: [Vec<u16, ZERO_CODES>; 2],
+    zeroing: &'static mut [Vec<u16, ZERO_CODES>; 2],
 }
 
 /// Most codes behind the line on the zeros: as many as are averaged.
@@ -29,7 +30,9 @@ const ZERO_CODES: usize = 256;
 impl TextLog {
     /// Text on the log's channel, frames on their own.
     pub(crate) fn new(frames: Frames) -> Self {
-        Self { frames, identity: Identity::default(), lost: 0, zeroing: [const { Vec::new() }; 2] }
+        static ZEROING: ConstStaticCell<[Vec<u16, ZERO_CODES>; 2]> =
+            ConstStaticCell::new([const { Vec::new() }; 2]);
+        Self { frames, identity: Identity::default(), lost: 0, zeroing: ZEROING.take() }
     }
 
     /// Sets the head of the binary log; before the journal starts.
@@ -48,7 +51,7 @@ impl Journal for TextLog {
     }
 
     fn see(&mut self, record: &Record) {
-        let [preload, compression] = &mut self.zeroing;
+        let [preload, compression] = self.zeroing;
         if record.telemetry.mode == Mode::Zero {
             // Beyond the last one none is kept.
             let _ = preload.push(record.codes[1]);

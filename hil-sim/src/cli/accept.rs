@@ -66,9 +66,10 @@ fn human(of: &Acceptance) -> String {
     let mark = |ok: bool| if ok { "yes" } else { "NO" }.to_owned();
     let keys = of.keys.iter().map(|key| {
         let end = |end: Option<f64>| end.map_or("-".to_owned(), brief);
-        let interval = format!("{} to {}", end(key.low), end(key.high));
-        let limit = brief(key.limit);
-        vec![key.key.clone(), key.unit.to_owned(), brief(key.stated), interval, limit, mark(key.ok)]
+        let interval = format!("{} to {}", end(key.found.low), end(key.found.high));
+        let [stated, limit] = [key.stated, key.limit].map(brief);
+        let (name, unit) = (key.found.name.clone(), key.found.unit.to_owned());
+        vec![name, unit, stated, interval, limit, mark(key.ok)]
     });
     let mut text = format!(
         "{}\n",

@@ -7,7 +7,7 @@ use super::coordinates::{FRICTION, LOAD, STEPS, STIFFENING, STIFFNESS, TAU};
 use super::forward::{CHANNELS, quotient};
 use super::noise::Noise;
 use super::record::Record;
-use super::result::{Fit, Identification, fitted, place_of};
+use super::result::{Fit, Identification, Parameter, fitted, place_of};
 use super::{IdentifyError, contact};
 use crate::record::Summary;
 use crate::scenario::Scenario;
@@ -68,13 +68,9 @@ pub struct Residual {
 /// A parameter as stated and as the logs show it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Key {
-    pub key: String,
-    pub unit: &'static str,
+    #[serde(flatten)]
+    pub found: Parameter,
     pub stated: f64,
-    pub found: f64,
-    /// Ends of its 95 % interval.
-    pub low: Option<f64>,
-    pub high: Option<f64>,
     /// Largest difference.
     pub limit: f64,
     pub ok: bool,
@@ -136,29 +132,18 @@ pub fn accept(
     let residuals = residuals(&found, &fit)?;
     let keys = keys(&found, &first.scenario);
     let gap = gaps(records, runs, &fit, readings);
-    for of in residuals.iter().filter(|of| !of.ok) {
-        let Residual { quantity, unit, rms, limit, .. } = of;
-        reasons.push(format!(
-            "{quantity}: {rms:.3} {unit} from the virtual rig's, at most {limit} {unit}"
-        ));
-    }
-    for of in keys.iter().filter(|of| !of.ok) {
-        let Key { key, unit, .. } = of;
-        let [found, stated, limit] = [of.found, of.stated, of.limit].map(brief);
-        reasons.push(format!(
-            "{key}: {found} {unit} in the logs, {stated} stated, at most {limit} apart"
-        ));
-    }
-    for of in gap.iter().filter(|of| !of.ok) {
-        let Gap { log, step, measured_mm, independent_mm, by, .. } = of;
-        let mm = |gap: Option<f64>| gap.map_or("none".to_owned(), |gap| format!("{gap:.3} mm"));
-        reasons.push(format!(
-            "{log}: gap at step {step}: {} by the controller, {} by the {}",
-            mm(*measured_mm),
-            mm(*independent_mm),
-            by.unwrap_or("ring")
-        ));
-    }
+    let off = residuals
+        .iter()
+        .filter(|of| !of.ok)
+        .map(|of| format!("{}: {:.3} {} from the virtual rig's", of.quantity, of.rms, of.unit));
+    reasons.extend(off);
+    let off = keys.iter().filter(|of| !of.ok).map(|Key { found, stated, .. }| {
+        let [value, stated] = [found.value, *stated].map(brief);
+        format!("{}: {value} {} in the logs, {stated} stated", found.name, found.unit)
+    });
+    reasons.extend(off);
+    let off = gap.iter().filter(|of| !of.ok);
+    reasons.extend(off.map(|of| format!("{}: the gap at step {}", of.log, of.step)));
     Ok(Acceptance { passed: reasons.is_empty(), residuals, keys, gap, reasons })
 }
 
@@ -197,28 +182,16 @@ fn residuals(found: &Identification, fit: &Fit) -> Result<Vec<Residual>, Identif
 
 fn keys(found: &Identification, scenario: &Scenario) -> Vec<Key> {
     let mut table = Table::try_from(scenario).expect("a scenario is always TOML");
-    let mut key = |of: &super::result::Parameter| {
+    let mut key = |of: &Parameter| {
         let (_, limit) = LIMITS.iter().find(|(name, _)| of.name.starts_with(name))?;
-        let stated = place_of(&mut table, &of.name).map_or(Some(1.0), |value| {
-            value.as_float().or_else(|| value.as_integer().map(|whole| whole as f64))
-        })?;
+        let stated = place_of(&mut table, &of.name).map_or(Some(1.0), |value| value.as_float())?;
         let limit = match limit {
             Limit::Part(part) => part * stated.abs(),
             Limit::Of(limit) => *limit,
         };
         // The drive's force is known by its tolerance.
-        let shown = of.identified || of.name == DRIVE;
-        let ok = shown && (of.value - stated).abs() <= limit;
-        Some(Key {
-            key: of.name.clone(),
-            unit: of.unit,
-            stated,
-            found: of.value,
-            low: of.low,
-            high: of.high,
-            limit,
-            ok,
-        })
+        let ok = (of.identified || of.name == DRIVE) && (of.value - stated).abs() <= limit;
+        Some(Key { found: of.clone(), stated, limit, ok })
     };
     found.parameters.iter().filter_map(&mut key).collect()
 }

@@ -106,6 +106,11 @@ impl Session {
         self
     }
 
+    /// The same read by these sensors.
+    pub fn with_sensors(self, sensors: Sensors) -> Self {
+        Self { sensors, ..self }
+    }
+
     /// Reads the sensors: the latest code of each at the present tick. Once a tick,
     /// before [`Session::advance`]. Here the scenario's faults come and go.
     pub fn sense(&mut self) -> SensorFrame {
