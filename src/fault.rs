@@ -92,7 +92,7 @@ codes! {
     StepLate = 202, "a step's window passed without a corner; searching on at crossing speed";
     StepMissing = 203, "a step of the table was not found";
     StepExtra = 204, "a corner was met where the step table has none";
-    PreloadLimited = 205, "the preload limit was reached: the crossing is slowed";
+    PreloadLimited = 205, "the preload limit slows the crossing below control.safe_speed_mm_s";
     SpeedFloor = 206, "the least crossing speed does not hold the gap within the preload limit";
     ResonanceAvoided = 207, "a speed was moved out of a structural mode's band";
     AdaptationBounded = 208, "the stiffness estimate reached the end of its range";
