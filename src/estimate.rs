@@ -3,6 +3,7 @@
 
 #![deny(clippy::float_arithmetic)]
 
+mod close;
 mod creep;
 pub mod crossing;
 mod crossing_speed;

@@ -10,6 +10,7 @@
 
 #[allow(clippy::float_arithmetic, reason = "SI to machine units, once at start")]
 mod build;
+mod measure;
 
 use crate::numeric::{LowPass, LowPassState, between, sqrt};
 use crate::units::Direction;
@@ -478,30 +479,6 @@ impl CrossingWatch {
         Some(CrossingEvent::GapClosed { height, gap, as_table, shift, plausible })
     }
 
-    /// Place in the kept depths of a wheel that has sunk by `fall`, and the part beyond it.
-    fn fall_index(&self, fall: Millimetres) -> Option<(usize, Ratio)> {
-        let place = (fall - self.step + HEIGHT_MOST) * PER_FALL;
-        let index = usize::try_from(place.floor()).ok()?;
-        Some((index, place - Q16::from_num(index as i32)))
-    }
-
-    fn keep_depth(&self, state: &mut WatchState, seen: &WatchInput) {
-        let kept = self.fall_index(seen.radius - state.baseline.output());
-        let slot = kept.and_then(|(index, _)| state.depths.get_mut(index));
-        if let Some(slot) = slot.filter(|slot| **slot == Q16::ZERO) {
-            *slot = seen.compression;
-        }
-    }
-
-    /// Compression as the wheel had sunk by `fall`, mm, if that was seen: by the two falls before
-    /// it, since behind it the lower wall may carry.
-    fn depth_at(&self, state: &WatchState, fall: Millimetres) -> Option<Millimetres> {
-        let (index, part) = self.fall_index(fall)?;
-        let before = *state.depths.get(index.checked_sub(1)?)?;
-        let here = *state.depths.get(index)?;
-        (here > Q16::ZERO && before > Q16::ZERO).then(|| here + (here - before) * part)
-    }
-
     /// A corner begins to carry.
     fn touch(&self, state: &mut WatchState, direction: Direction, seen: &WatchInput) {
         state.ticks = 0;
@@ -515,19 +492,5 @@ impl CrossingWatch {
             Direction::Deploy => Contact::Both,
             Direction::Retract => Contact::Corner,
         };
-    }
-
-    /// What a lift-off shows with this depth at the corner and the centre this high above the
-    /// lower wall, for a step of height h, mm: `y^2 - (y-h)^2 = h (2y - h)`.
-    fn measure(&self, depth: Millimetres, height: Millimetres, step: Millimetres) -> Lift {
-        let reach = self.radius - depth;
-        let over = height - step;
-        let chord = step * (height + over);
-        Lift {
-            depth,
-            height,
-            gap: sqrt((reach * reach + chord).max(Q16::ZERO)) - self.radius,
-            distance: sqrt((reach * reach - over * over).max(Q16::ZERO)),
-        }
     }
 }

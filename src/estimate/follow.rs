@@ -1,24 +1,20 @@
 //! Follows a crossing: what the watch detects becomes odometry, level and review.
 
+use super::close::{Measured, slip_of};
 use super::crossing::{Contact, CrossingEvent, Lift, WatchInput};
 use super::landing::OnEdge;
 use super::odometry::Rolling;
 use super::restore::UNSURE_WITHIN;
 use super::tread::Rolls;
-use super::{
-    EstimateState, Estimator, Expectation, Findings, LiftPoint, OpenCrossing, Position, Slip,
-};
+use super::{EstimateState, Estimator, Expectation, Findings, LiftPoint, OpenCrossing, Position};
 use crate::fault::{Fault, Limit};
 use crate::model::LimitedBy;
 use crate::sense::{FILTER_LAG, SensedState};
-use crate::units::{Direction, Millimetres, Newtons, Q16, Ratio, Tick, q16};
+use crate::units::{Direction, Millimetres, Newtons, Q16, Ratio, Tick};
 
 /// Ticks for which a wheel may slip under the most preload that there is: five times those in which
 /// the published tread relaxes.
 const HOPELESS_TICKS: u32 = 500;
-/// Deviation of a step's height from which it is reported, mm: three steps of the angle code, and
-/// the tolerance of a sleeve, 0.05.
-const HEIGHT_SEEN: Millimetres = q16(120_000);
 
 /// What the estimator is given in a tick.
 #[derive(Clone, Copy, Debug)]
@@ -337,136 +333,6 @@ impl Estimator {
         found.replan = true;
     }
 
-    /// Largest residual of a step that is where the table has it, mm: its tolerance, and three
-    /// sigma of the position.
-    fn tolerated(&self, state: &EstimateState) -> Millimetres {
-        self.steps.tolerance() + self.sigma(state) * q16(3_000_000)
-    }
-
-    /// Whether a step is off by no more than is tolerated, or by as much as the one before it.
-    fn is_explained(&self, state: &EstimateState, step: u8, residual: Millimetres) -> bool {
-        // A step that is met again does not speak for another one.
-        let other = state.displaced.filter(|(other, _)| *other != step);
-        let before = other.map_or(Q16::ZERO, |(_, off)| off);
-        let tolerance = self.tolerated(state);
-        residual.abs() <= tolerance || (residual - before).abs() <= tolerance
-    }
-
-    /// Corrects the odometry by a step's residual; what is left of it, mm.
-    fn correct(
-        &self,
-        state: &mut EstimateState,
-        sensed: &SensedState,
-        (step, residual): (u8, Millimetres),
-        found: &mut Findings,
-    ) -> Millimetres {
-        if residual.abs() <= self.tolerated(state) {
-            state.displaced = None;
-            state.odometry.correct(state.position, residual)
-        } else if self.is_explained(state, step, residual) {
-            // Two in a row off by the same: the odometry is wrong.
-            state.odometry.set_by_step(sensed.travel, state.position - residual);
-            state.displaced = None;
-            Q16::ZERO
-        } else if state.displaced.is_some_and(|(other, _)| other != step) {
-            // Two in a row off by different distances: the odometry has lost its scale, or the
-            // table is wrong throughout.
-            found.fault.get_or_insert(Fault::StepsDisagree);
-            residual
-        } else {
-            // One alone: the step is displaced.
-            state.displaced = Some((step, residual));
-            report_displaced(state, residual, found);
-            residual
-        }
-    }
-
-    /// A step whose wall behind it was not measured.
-    fn as_table(&self, gap: Millimetres) -> Measured {
-        let (height, shift) = (self.steps.height(), Q16::ZERO);
-        Measured { height, gap, as_table: gap, shift, plausible: false }
-    }
-
-    /// The crossing is behind: its step corrects the position, and it is reported for review,
-    /// unless only half of it was observed.
-    fn close(
-        &self,
-        state: &mut EstimateState,
-        sensed: &SensedState,
-        measured: &Measured,
-        found: &mut Findings,
-    ) {
-        let higher = measured.height - self.steps.height();
-        state.raised += higher * Q16::from_num(state.direction.sign());
-        let Some(mut open) = state.crossing else { return };
-        if let Some(mut point) = open.lift {
-            if !open.resumed && !open.turned {
-                // How low the wall lies that takes a retracting wheel was not known at the lift.
-                let slid = open.landing.filter(|landing| landing.slid > Q16::ZERO);
-                let landing = slid.or_else(|| {
-                    let landing = open.slide.landing()?;
-                    open.slip.lost += landing.slid;
-                    open.landing = Some(landing);
-                    state.odometry.slip(landing.lost, Q16::ZERO);
-                    state.begin_tick(sensed.travel);
-                    Some(landing)
-                });
-                let shift = landing.map_or(measured.shift, |landing| landing.face - point.face);
-                if state.known.is_searching() && open.step > 0 {
-                    self.count_down(state, sensed, &mut open);
-                    found.advanced = true;
-                }
-                let left = match self.steps.face(open.step) {
-                    Some(table) if state.known.is_searching() => {
-                        let left = table - point.face;
-                        let position = state.position + left - shift;
-                        state.odometry.set_by_step(sensed.travel, position);
-                        state.known = Position::Located;
-                        (point.residual, open.corrected) = (-left, true);
-                        left
-                    }
-                    None => shift,
-                    Some(_) if open.corrected => state.odometry.refine(shift),
-                    Some(_) => {
-                        let residual = point.residual + shift;
-                        self.correct(state, sensed, (open.step, residual), found) - point.residual
-                    }
-                };
-                if let Some(landing) = landing.filter(|landing| landing.slid > Q16::ZERO) {
-                    state.odometry.slip(Q16::ZERO, landing.sigma());
-                }
-                point.face += left;
-                point.residual += left;
-                state.begin_tick(sensed.travel);
-            }
-            point.gap = measured.as_table;
-            open.lift = Some(point);
-        }
-        state.crossing = None;
-        open.gap = measured.gap;
-        open.height = measured.height;
-        open.deepest = state.watch.deepest;
-        found.slip = slip_of(&open, open.lift.map_or(state.position, |point| point.face));
-        // Of a crossing that began in its middle the wall below was not measured.
-        if higher.abs() > HEIGHT_SEEN && !open.resumed {
-            found.limit(Limit::StepHeight);
-        }
-        if open.lift.is_some() && !open.turned {
-            found.closed = Some((open, measured.plausible));
-            found.replan = true;
-        }
-    }
-
-    /// A step found by a search on the way down is the one above the wall that the arm shows behind
-    /// it: between walls, steps off their heights might have been taken for another level.
-    fn count_down(&self, state: &mut EstimateState, sensed: &SensedState, open: &mut OpenCrossing) {
-        let most = i32::from(self.steps.count()) - 1;
-        let level = sensed.steps_up.round().min(most).max(0) as u8;
-        state.level = level;
-        state.next_step = level;
-        open.step = level + 1;
-    }
-
     /// Input of the crossing watch.
     pub(super) fn watch_input(&self, state: &EstimateState, sensed: &SensedState) -> WatchInput {
         let to_window = self.steps.to_window(state.direction, self.distance(state));
@@ -544,34 +410,6 @@ fn passed(state: &mut EstimateState) {
 /// now, mm.
 fn position_of_radius(state: &EstimateState, sensed: &SensedState) -> Millimetres {
     state.position - sensed.speed.value * FILTER_LAG
-}
-
-/// What the wall behind a step shows of the crossing.
-struct Measured {
-    height: Millimetres,
-    gap: Millimetres,
-    as_table: Millimetres,
-    shift: Millimetres,
-    plausible: bool,
-}
-
-/// Slip of a crossing so far, if any.
-fn slip_of(open: &OpenCrossing, position: Millimetres) -> Option<Slip> {
-    let amount = open.slip.lost;
-    let sigma = open.landing.map_or(open.slip.sigma(), |landing| landing.sigma());
-    (amount > Q16::ZERO).then_some(Slip { position, amount, sigma })
-}
-
-/// Reports a step outside its window, unless it has been reported already.
-fn report_displaced(state: &EstimateState, residual: Millimetres, found: &mut Findings) {
-    let early = match state.direction {
-        Direction::Deploy => residual < Q16::ZERO,
-        Direction::Retract => residual > Q16::ZERO,
-    };
-    let reported = state.crossing.is_some_and(|open| open.reported);
-    if !reported {
-        found.limit(if early { Limit::StepEarly } else { Limit::StepLate });
-    }
 }
 
 #[cfg(test)]

@@ -1,5 +1,6 @@
 //! Following a crossing: steps found, missed and displaced.
 
+use super::super::close::report_displaced;
 use super::super::restore::tests::{estimator, sensed};
 use super::*;
 use crate::units::q16;

@@ -20,8 +20,8 @@ pub(super) struct Args {
     #[arg(value_name = "LOG", required = true)]
     logs: Vec<PathBuf>,
 
-    /// The gap at a step as a camera or a feeler gauge shows it, mm: 2=2.61. May be repeated; a
-    /// gap without a reading is judged by the virtual rig's tread.
+    /// The gap at a step of the first log as a camera or a feeler gauge shows it, mm: 2=2.61. May be
+    /// repeated; a gap without a reading is judged by the virtual rig's tread.
     #[arg(long, value_name = "STEP=MM", value_parser = reading)]
     gap: Vec<(usize, f64)>,
 
@@ -48,11 +48,10 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
         Ok(boots.pop().map(|boot| boot.summary).unwrap_or_default())
     };
     let runs: Vec<Summary> = logs.iter().map(one).collect::<Result<_, _>>()?;
-    let crossed = |step: usize| {
-        runs.iter().any(|run| run.crossings.iter().any(|line| usize::from(line.index) == step))
-    };
+    let crossed =
+        |step: usize| runs[0].crossings.iter().any(|line| usize::from(line.index) == step);
     if let Some((step, _)) = args.gap.iter().find(|(step, _)| !crossed(*step)) {
-        return Err(Failure::input(format!("--gap: step {step} is crossed in none of the logs")));
+        return Err(Failure::input(format!("--gap: step {step} is not crossed in the first log")));
     }
     let result = {
         let _progress = progress::spinner("accept");

@@ -4,6 +4,7 @@
 use nalgebra::DMatrix;
 
 use crate::plant::draw::PlantParameters;
+use crate::plant::mismatch::Mismatch;
 use crate::plant::ring::RingParameters;
 use crate::plant::spread::Spread;
 use crate::plant::wall::{Step, Wall};
@@ -75,6 +76,8 @@ impl Coordinates {
     pub fn of(scenario: &Scenario) -> Self {
         let mut exact = scenario.clone();
         exact.spread = Spread::default();
+        // A log of the virtual rig holds what its controller was not told: it is not known here.
+        exact.mismatch = Mismatch::default();
         exact.run.seed = 0;
         let nominal = exact.plant();
         let steps = nominal.wall.steps().len();

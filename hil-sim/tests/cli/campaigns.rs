@@ -171,8 +171,7 @@ fn merged_parts_are_what_one_machine_prints_to_the_bit() {
         let whole = rig_in(at, &[&command[..], &["--json"]].concat());
         assert_eq!(stdout(&json), stdout(&whole), "{command:?}");
         // The keys of a part are those of the whole, and its lines.
-        let part: Value =
-            serde_json::from_slice(&std::fs::read(at.join("1.json")).unwrap()).unwrap();
+        let part = super::json(&at.join("1.json"));
         for key in object(&whole).as_object().unwrap().keys() {
             assert!(part.get(key).is_some(), "{command:?}: {key}");
         }

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use super::{code, is_empty, number, object, rig, rig_in, stdout};
+use super::{code, is_empty, json, number, object, rig, rig_in, stdout};
 
 /// Keys of the summary that others rely on.
 const KEYS: [&str; 13] = [
@@ -73,8 +73,7 @@ fn writes_its_files_and_prints_every_key() {
         assert!(files.contains(&Value::from(file.to_str().unwrap())), "{name}");
         assert!(directory.path().join(&file).metadata().unwrap().len() > 100, "{name}");
     }
-    let written = std::fs::read(directory.path().join(run).join("summary.json")).unwrap();
-    let written: Value = serde_json::from_slice(&written).unwrap();
+    let written = json(&directory.path().join(run).join("summary.json"));
     assert_eq!(written["trace_digest"], summary["trace_digest"]);
 }
 

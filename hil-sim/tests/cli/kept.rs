@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use super::{code, number, object, refused_in, rig_in, stderr, stdout};
+use super::{code, json, number, object, refused_in, rig_in, stderr, stdout};
 
 fn good(at: &Path, arguments: &[&str]) -> std::process::Output {
     let output = rig_in(at, arguments);
@@ -29,8 +29,7 @@ fn folder_banner_and_summary_carry_overrides_draw_and_version() {
     let text = stdout(&output).replace("\n  ", " ");
     assert!(text.contains("seed 3, preload.limit_n = 52, tread.tau_s = 0.2"), "{text}");
     let folder = at.join("out/deploy-prototype-scheduled-3-preload.limit_n=52-tread.tau_s=0.2");
-    let summary: Value =
-        serde_json::from_slice(&std::fs::read(folder.join("summary.json")).unwrap()).unwrap();
+    let summary = json(&folder.join("summary.json"));
     assert_eq!(number(&summary["overrides"], "tread.tau_s"), 0.2);
     assert_eq!(number(&summary["overrides"], "preload.limit_n"), 52.0);
     assert_eq!(summary["overrides"].as_object().unwrap().len(), 2, "{}", summary["overrides"]);
@@ -57,10 +56,8 @@ fn another_run_keeps_its_folder() {
     let output = good(at, &["deploy", "bench.toml", "--json"]);
     let other = object(&output);
     assert_ne!(wrote(&first, "summary.json"), wrote(&other, "summary.json"));
-    let digest = |found: &Value| {
-        let text = std::fs::read(at.join(wrote(found, "summary.json"))).unwrap();
-        serde_json::from_slice::<Value>(&text).unwrap()["trace_digest"].clone()
-    };
+    let digest =
+        |found: &Value| json(&at.join(wrote(found, "summary.json")))["trace_digest"].clone();
     assert_eq!(digest(&first), first["trace_digest"]);
     assert_eq!(digest(&other), other["trace_digest"]);
     // Who names the folder gets it, and is told.
@@ -142,8 +139,7 @@ fn a_run_without_a_crossing_has_no_gap() {
     let text = stdout(&output);
     assert!(text.contains("no crossing, so no gap"), "{text}");
     assert!(!text.contains("below the reference"), "{text}");
-    let summary: Value =
-        serde_json::from_slice(&std::fs::read(at.join("ice/summary.json")).unwrap()).unwrap();
+    let summary = json(&at.join("ice/summary.json"));
     assert_eq!(
         (&summary["max_gap_mm"], &summary["crossings"]),
         (&Value::Null, &Value::Array(vec![]))
@@ -162,8 +158,7 @@ fn a_gap_over_the_reference_is_amber_and_has_its_word_everywhere() {
         at,
         &["deploy", "--controller", "constant", "--set", "control.gap_ref_mm=2.0", "--out", "run"],
     );
-    let found: Value =
-        serde_json::from_slice(&std::fs::read(at.join("run/summary.json")).unwrap()).unwrap();
+    let found = json(&at.join("run/summary.json"));
     assert!(number(&found, "max_gap_mm") > number(&found, "gap_ref_mm"), "{found}");
     let text = stdout(&output);
     assert!(text.contains("over the reference gap"), "{text}");

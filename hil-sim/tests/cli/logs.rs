@@ -8,7 +8,7 @@ use serde_json::Value;
 
 use crate::record::logs::data;
 
-use super::{code, good, number, object, refused_in, rig, rig_in, stderr, stdout};
+use super::{code, good, json, number, object, refused_in, rig, rig_in, stderr, stdout};
 
 /// The frames of a deployment.
 fn frames() -> Vec<Vec<u8>> {
@@ -88,10 +88,7 @@ fn a_log_has_its_report_and_two_logs_their_comparison() {
         assert_eq!(code(&output), 0);
     }
     let a = rig_in(directory.path(), &["report", "a/log.mcap", "--out", "page.html", "--json"]);
-    let summary: Value = serde_json::from_slice(
-        &std::fs::read(directory.path().join("a/summary.json")).expect("there"),
-    )
-    .expect("JSON");
+    let summary = json(&directory.path().join("a/summary.json"));
     assert_eq!(object(&a)["crossings"], summary["crossings"]);
     let page = |name: &str| std::fs::read_to_string(directory.path().join(name)).expect("a page");
     assert_eq!(page("page.html"), page("a/report.html"), "the page of the deployment itself");

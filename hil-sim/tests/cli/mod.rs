@@ -30,6 +30,11 @@ fn rig(arguments: &[&str]) -> Output {
     rig_in(directory.path(), arguments)
 }
 
+/// The object in a file.
+pub(crate) fn json(path: &Path) -> Value {
+    serde_json::from_slice(&std::fs::read(path).expect("a file")).expect("JSON")
+}
+
 /// The exit code.
 pub(crate) fn code(output: &Output) -> i32 {
     output.status.code().expect("the command was not killed")

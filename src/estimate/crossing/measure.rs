@@ -1,0 +1,53 @@
+//! What a crossing measures: the compression of a wheel that falls, and the gap.
+
+#![deny(clippy::float_arithmetic)]
+
+use super::{CrossingWatch, HEIGHT_MOST, Lift, PER_FALL, WatchInput, WatchState};
+use crate::numeric::sqrt;
+use crate::units::{Millimetres, Q16, Ratio};
+
+impl CrossingWatch {
+    /// Place in the kept depths of a wheel that has sunk by `fall`, and the part beyond it.
+    fn fall_index(&self, fall: Millimetres) -> Option<(usize, Ratio)> {
+        let place = (fall - self.step + HEIGHT_MOST) * PER_FALL;
+        let index = usize::try_from(place.floor()).ok()?;
+        Some((index, place - Q16::from_num(index as i32)))
+    }
+
+    /// Keeps the compression at the present fall.
+    pub(super) fn keep_depth(&self, state: &mut WatchState, seen: &WatchInput) {
+        let kept = self.fall_index(seen.radius - state.baseline.output());
+        let slot = kept.and_then(|(index, _)| state.depths.get_mut(index));
+        if let Some(slot) = slot.filter(|slot| **slot == Q16::ZERO) {
+            *slot = seen.compression;
+        }
+    }
+
+    /// Compression as the wheel had sunk by `fall`, mm, if that was seen: by the two falls before
+    /// it, since behind it the lower wall may carry.
+    pub(super) fn depth_at(&self, state: &WatchState, fall: Millimetres) -> Option<Millimetres> {
+        let (index, part) = self.fall_index(fall)?;
+        let before = *state.depths.get(index.checked_sub(1)?)?;
+        let here = *state.depths.get(index)?;
+        (here > Q16::ZERO && before > Q16::ZERO).then(|| here + (here - before) * part)
+    }
+
+    /// What a lift-off shows with this depth at the corner and the centre this high above the
+    /// lower wall, for a step of height h, mm: `y^2 - (y-h)^2 = h (2y - h)`.
+    pub(super) fn measure(
+        &self,
+        depth: Millimetres,
+        height: Millimetres,
+        step: Millimetres,
+    ) -> Lift {
+        let reach = self.radius - depth;
+        let over = height - step;
+        let chord = step * (height + over);
+        Lift {
+            depth,
+            height,
+            gap: sqrt((reach * reach + chord).max(Q16::ZERO)) - self.radius,
+            distance: sqrt((reach * reach - over * over).max(Q16::ZERO)),
+        }
+    }
+}
