@@ -53,8 +53,7 @@ fn another_run_keeps_its_folder() {
     assert_eq!(first["files"], again["files"], "the same run");
     // The same name, another run.
     std::fs::write(&file, "[tread]\ntau_s = 0.21\n").unwrap();
-    let output = good(at, &["deploy", "bench.toml", "--json"]);
-    let other = object(&output);
+    let other = object(&good(at, &["deploy", "bench.toml", "--json"]));
     assert_ne!(wrote(&first, "summary.json"), wrote(&other, "summary.json"));
     let digest =
         |found: &Value| json(&at.join(wrote(found, "summary.json")))["trace_digest"].clone();

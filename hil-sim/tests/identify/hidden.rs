@@ -153,11 +153,10 @@ fn driven(
     (Record::new(name, scenario, samples).expect("a sound record"), summary)
 }
 
-/// What changes on a rig after its identification, and the key that names it.
+/// The key that names a change of a rig after its identification, and the change.
 pub(crate) type Change = (&'static str, fn(&mut PlantParameters));
 
-/// Why a hidden rig with the parameters that its logs gave is not accepted by two deployments, after
-/// each of these changes.
+/// Why a hidden rig as identified is not accepted by two deployments, after each change.
 pub(crate) fn accepted(seed: u64, changes: &[Change]) -> Vec<Vec<String>> {
     let scenario = widened(seed);
     let records: Vec<Record> =

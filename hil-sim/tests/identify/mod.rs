@@ -62,10 +62,10 @@ fn a_rig_is_accepted_as_identified_and_not_once_it_has_changed() {
     let seeds = if long() { 20 } else { 1 };
     let mut refused = Vec::new();
     for seed in 1_700_001..=1_700_000 + seeds {
-        let reasons = hidden::accepted(seed, &changes);
-        refused.extend((!reasons[0].is_empty()).then(|| reasons[0].clone()));
-        for ((name, _), why) in changes.iter().zip(&reasons).skip(1) {
-            // A friction that is off may show as slip, load or tread.
+        let mut reasons = hidden::accepted(seed, &changes).into_iter();
+        refused.extend(reasons.next().filter(|why| !why.is_empty()));
+        for ((name, _), why) in changes.iter().skip(1).zip(reasons) {
+            // Friction may show as slip, load or tread.
             let named = why.iter().any(|why| why.starts_with(name) || *name == "plant.mu");
             assert!(named, "seed {seed}, {name}: {why:?}");
         }
@@ -134,7 +134,7 @@ fn logs_of_two_rigs_are_refused_and_the_odd_one_is_named() {
     assert_eq!(judged(&[&nominal, &back, "--gap", "2=2.63"])["passed"], true);
     let wide = judged(&[&nominal, &back, "--gap", "2=2.8"]);
     let off = wide["gap"].as_array().unwrap().iter().filter(|gap| gap["ok"] == false).count();
-    assert_eq!((&wide["passed"], off), (&false.into(), 1), "{wide}");
+    assert!(wide["passed"] == false && off == 1, "{wide}");
     let soft = judged(&[&log("soft", &["--set", "mismatch.tread_stiffness=0.85"])]);
     assert_eq!(soft["residuals"][0]["ok"], false, "{soft}");
     refused_in(at, &["accept", &back, "--gap", "7=2.6"], &["--gap: step 7"]);
