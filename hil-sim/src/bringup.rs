@@ -9,6 +9,7 @@ mod drive;
 mod figures;
 mod line;
 mod motion;
+mod operate;
 mod operator;
 mod page;
 mod pretightener;
@@ -23,6 +24,7 @@ use crate::scenario::Scenario;
 
 pub use figures::stowed;
 pub use line::Line;
+pub use operate::{FARTHEST_MM, Operated, Operation, operate};
 pub use operator::{Action, Operator, Question, Seen, Sensor, Stdin};
 pub use page::html;
 pub use state::Progress;
@@ -167,8 +169,11 @@ pub enum BringupError {
     #[error(transparent)]
     Line(#[from] crate::params::StoreError),
     /// The user did not confirm.
-    #[error("not confirmed: {0} Nothing was moved; the next call goes on from here")]
+    #[error("not confirmed: {0} Nothing was moved")]
     Declined(String),
+    /// The rig is not at rest, or holds a fault.
+    #[error("nothing was moved: {0}")]
+    Busy(String),
     /// Nothing is left of the scripted answers.
     #[error("no answer to: {0}")]
     NoAnswer(String),
@@ -183,6 +188,16 @@ pub(crate) struct Session<'a, 'p> {
     pub(crate) proposed: &'a mut Scenario,
     /// Told to the user as it is measured.
     pub(crate) say: &'a mut dyn FnMut(&str),
+}
+
+impl Session<'_, '_> {
+    /// A value that was measured, with half the width of its interval.
+    pub(crate) fn measured(&mut self, key: &str, value: f64, within: f64) {
+        let digits = (1.0 - within.log10().floor()).clamp(0.0, 4.0) as usize;
+        let (low, high) = (value - within, value + within);
+        let source = format!("{low:.digits$} to {high:.digits$}, first power-up");
+        self.proposed.sources.insert(key.to_owned(), source);
+    }
 }
 
 /// What a power-up proposes: key, value on the board, value measured.

@@ -23,6 +23,7 @@ pub mod live;
 mod log_files;
 mod merge;
 mod montecarlo;
+pub mod operate;
 pub mod output;
 pub mod params;
 mod parse;
@@ -68,6 +69,8 @@ enum Verb {
     Compare(compare::Args),
     Envelope(envelope::Args),
     Montecarlo(montecarlo::Args),
+    #[command(flatten)]
+    Operate(operate::Verb),
     Faults(faults::Args),
     Flash(flash::Args),
     Identify(identify::Args),
@@ -122,6 +125,7 @@ impl Verb {
             Self::Compare(args) => compare::run(args),
             Self::Envelope(args) => envelope::run(args),
             Self::Montecarlo(args) => montecarlo::run(args),
+            Self::Operate(verb) => operate::run(verb),
             Self::Faults(args) => faults::run(args),
             Self::Flash(args) => flash::run(args),
             Self::Identify(args) => identify::run(args),

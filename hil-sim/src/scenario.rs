@@ -10,6 +10,7 @@ mod run;
 mod validate;
 mod value;
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use interstage::rig::Rig;
@@ -43,6 +44,10 @@ pub struct Scenario {
     /// What the plant has and the controller is not told.
     pub mismatch: Mismatch,
     pub run: RunOptions,
+    /// What each measured value comes from, with its interval, by key: the file's section
+    /// `sources`.
+    #[serde(skip)]
+    pub sources: BTreeMap<String, String>,
 }
 
 impl Default for Scenario {
@@ -95,6 +100,7 @@ impl Scenario {
             noise: Noise::usual(),
             mismatch: Mismatch::default(),
             run: RunOptions::default(),
+            sources: BTreeMap::new(),
         }
     }
 
@@ -121,9 +127,22 @@ impl Scenario {
         changed.map(|(key, value)| (key, serde_json::json!(value))).collect()
     }
 
+    /// Properties of the rig that nobody has measured: the preset's value, and no source.
+    pub fn assumed(&self) -> Vec<String> {
+        let stated = self.overrides();
+        let is_known = |key: &String| stated.contains_key(key) || self.sources.contains_key(key);
+        let measured = self.keys().into_iter().filter(|info| info.measure).map(|info| info.key);
+        measured.filter(|key| !is_known(key)).collect()
+    }
+
     /// The complete scenario as TOML; reading it back gives the same scenario.
     pub fn to_toml(&self) -> String {
-        toml::to_string(self).expect("numbers, words and lists are always TOML")
+        const ALWAYS: &str = "numbers, words and lists are always TOML";
+        let text = toml::to_string(self).expect(ALWAYS);
+        if self.sources.is_empty() {
+            return text;
+        }
+        text + "\n[sources]\n" + &toml::to_string(&self.sources).expect(ALWAYS)
     }
 
     /// The `count` seeds that follow this one.
@@ -189,20 +208,24 @@ impl Scenario {
         mut file: Option<(String, Table)>,
         sets: &[String],
     ) -> Result<Self, ScenarioError> {
-        let mut from_file = None;
-        if let Some((origin, table)) = &mut file
-            && let Some(name) = table.remove("preset")
-        {
-            let name = name.as_str().ok_or_else(|| no_preset(origin, &name))?;
-            from_file = Some((name.to_owned(), origin.clone()));
+        let (mut from_file, mut sources) = (None, BTreeMap::new());
+        if let Some((origin, table)) = &mut file {
+            if let Some(name) = table.remove("preset") {
+                let name = name.as_str().ok_or_else(|| no_preset(origin, &name))?;
+                from_file = Some((name.to_owned(), origin.clone()));
+            }
+            if let Some(stated) = table.remove("sources") {
+                sources = merge::sources(origin, stated)?;
+            }
         }
         let from_set = sets.iter().rev().filter_map(|text| value::split(text));
         let from_set = from_set.filter(|(key, _)| *key == "preset").map(|(_, name)| name).next();
-        let base = match (from_set.or(preset), from_file) {
+        let mut base = match (from_set.or(preset), from_file) {
             (Some(name), _) => Self::named(name.trim_matches('"'))?,
             (None, Some((name, origin))) => Self::from_preset(&name, &origin)?,
             (None, None) => Self::default(),
         };
+        base.sources = sources;
         base.overlaid(file.as_ref(), sets)
     }
 
@@ -218,8 +241,11 @@ impl Scenario {
             merged.layer(origin, table)?;
         }
         sets.iter().try_for_each(|text| merged.set(text))?;
-        let scenario: Self =
+        let mut scenario: Self =
             merged.table.try_into().expect("every value was checked for the kind of its key");
+        // What the command line overrides is not what was measured.
+        scenario.sources = self.sources.clone();
+        scenario.sources.retain(|key, _| merged.provenance.of(key) != COMMAND_LINE);
         validate::check(&scenario, &merged.provenance)?;
         Ok(scenario)
     }

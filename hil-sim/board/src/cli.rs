@@ -7,14 +7,15 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
+use hil_sim::bringup::Operation;
 use hil_sim::cli::failure::{Failure, Outcome};
-use hil_sim::cli::{bringup, capture, faults, live, output, params};
+use hil_sim::cli::{bringup, capture, faults, live, operate, output, params};
 use hil_sim::faults::campaign::Twin;
 use hil_sim::firmware::{self, Profile, build_binary};
 use hil_sim::params::Client;
 use hil_sim::progress;
 use hil_sim::record::Virtual;
-use hil_sim::scenario::Scenario;
+use hil_sim::scenario::{Direction, Scenario};
 use serde::Serialize;
 
 use crate::bench::Bench;
@@ -43,6 +44,8 @@ enum Verb {
     Live(live::Args),
     Faults(faults::Args),
     Params(params::Args),
+    #[command(flatten)]
+    Operate(operate::Verb),
     #[command(hide = true)]
     Cycles(CyclesArgs),
 }
@@ -82,6 +85,7 @@ pub fn main() -> ExitCode {
         Verb::Live(args) => live(args),
         Verb::Faults(args) => faults(args),
         Verb::Params(args) => params(args),
+        Verb::Operate(verb) => operate(verb),
         Verb::Cycles(args) => cycles(args),
     })
 }
@@ -102,12 +106,27 @@ fn bring_up(args: &bringup::Args) -> Result<Outcome, Failure> {
         parsed.map_err(|error| Failure::input(format!("--mistake {name}: {error}")))
     };
     let mistakes: Vec<Mistake> = args.mistake.iter().map(mistake).collect::<Result<_, _>>()?;
-    let scenario = Scenario::default();
+    let given = args.scenario()?;
+    let scenario = given.clone().unwrap_or_default();
     let (elf, strings) = image(&scenario)?;
-    let bench = Bench::wired(&elf, &strings, &scenario, &mistakes).map_err(Failure::run)?;
+    let mut bench = Bench::wired(&elf, &strings, &scenario, &mistakes).map_err(Failure::run)?;
+    if given.is_some() {
+        run::store(&mut bench.machine, &scenario).map_err(Failure::run)?;
+    }
     let mut board = Attended::new(bench);
-    let mut person = board.person(bringup::person(args));
+    let mut person = board.person(bringup::person(args.yes));
     bringup::carry_out(args, &mut board, &mut person)
+}
+
+/// An operator's verb: stowed to jog and zero, pressed at the end of travel to release and go home.
+fn operate(verb: &operate::Verb) -> Result<Outcome, Failure> {
+    let mut scenario = Scenario::default();
+    if matches!(verb.parts().0, Operation::Home | Operation::Release) {
+        scenario.run.direction = Direction::Retract;
+    }
+    let (elf, strings) = image(&scenario)?;
+    let mut bench = Bench::new(&elf, &strings, &scenario).map_err(Failure::run)?;
+    operate::carry_out(verb, &mut bench)
 }
 
 fn capture(args: &capture::Args) -> Result<Outcome, Failure> {

@@ -114,8 +114,9 @@ impl Port for Bench<'_> {
     }
 
     fn down(&mut self, channel: u32, bytes: &[u8]) -> Result<usize, PortError> {
-        match channel {
-            1 => self.line_send(bytes).map_err(gone),
+        match (channel, bytes) {
+            (0, [letter]) => self.send(*letter).map(usize::from).map_err(gone),
+            (1, bytes) => self.line_send(bytes).map_err(gone),
             _ => Err(PortError::Board(format!("nothing sends down channel {channel}"))),
         }
     }

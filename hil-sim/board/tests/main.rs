@@ -11,6 +11,7 @@ mod getting_started;
 mod hil;
 mod kept;
 mod log;
+mod operate;
 mod panics;
 mod params;
 mod probe;

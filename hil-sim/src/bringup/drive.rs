@@ -1,5 +1,7 @@
 //! The drive's motor in the service mode: its bridge, its encoder's lines, direction, speed.
 
+use std::ops::ControlFlow;
+
 use super::figures::{Counted, Scale, counted, mean};
 use super::line::{Motion, drive as drive_by, press};
 use super::motion::{CHANGED, bridge, driven, fault};
@@ -23,7 +25,7 @@ pub(super) fn drive(session: &mut Session<'_, '_>) -> Result<Vec<Check>, Bringup
         for (pin, seen) in lines.iter_mut().enumerate() {
             seen[(port >> pin & 1) as usize] = true;
         }
-        Ok(())
+        Ok(ControlFlow::Continue(()))
     })?;
     let (bridge, silent) = bridge(&slow, 0, SLOW);
     let mut checks = vec![bridge];
@@ -59,6 +61,9 @@ pub(super) fn drive(session: &mut Session<'_, '_>) -> Result<Vec<Check>, Bringup
     let rounded = (no_load * 10.0).round() / 10.0;
     if no_load > 1.0 {
         session.proposed.rig.drive.no_load_speed_mm_s = rounded;
+        // A count at either end of the steady half of each motion.
+        let within = 2.0 * scale.count_mm / (0.25 * (FAST - SLOW));
+        session.measured("drive.no_load_speed_mm_s", rounded, within);
     }
     checks.push(check(
         "drive speed",

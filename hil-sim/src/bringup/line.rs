@@ -1,19 +1,22 @@
 //! The line to the board with its log: what it does each millisecond, and what it is asked.
 
+use std::ops::ControlFlow;
 use std::time::Duration;
 
 use interstage::log::Record;
 use interstage::params::service::Request;
-use interstage::supervise::{Mode, ServiceDuties};
+use interstage::supervise::{Command, Mode, ServiceDuties};
 use interstage::units::Duty;
 
 use super::BringupError;
 use crate::params::{Client, Held, Store, StoreError};
 use crate::probe::{Port, PortError};
-use crate::record::{Decoder, Item};
+use crate::record::{Decoder, Item, letter};
 
 /// RTT channel of the binary log.
 const LOG: u32 = 1;
+/// RTT channel of the console.
+const CONSOLE: u32 = 0;
 /// Time after which a request is repeated, ms of the board: a quarter of the firmware's dead
 /// man.
 const REPEAT_MS: u32 = 50;
@@ -100,24 +103,25 @@ impl<'p> Line<'p> {
         Ok(u32::from_le_bytes(bytes))
     }
 
-    /// Rows of so many milliseconds of the board; fewer if its log is silent. `each` is called
-    /// meanwhile.
-    pub(super) fn listen_and(
+    /// Rows of so many milliseconds of the board; fewer if its log is silent, or if `each`, which
+    /// is called meanwhile, breaks it off.
+    fn listen_and(
         &mut self,
         milliseconds: u32,
-        mut each: impl FnMut(&mut Self) -> Result<(), BringupError>,
+        mut each: impl FnMut(&mut Self) -> Result<ControlFlow<()>, BringupError>,
     ) -> Result<Vec<Record>, BringupError> {
         self.listener().rows.clear();
         let (mut heard, mut heard_at) = (0, self.listener().now());
         loop {
             self.listener().pass()?;
-            each(self)?;
+            let flow = each(self)?;
             let now = self.listener().now();
             let rows = &mut self.listener().rows;
             if rows.len() > heard {
                 (heard, heard_at) = (rows.len(), now);
             }
-            if heard >= milliseconds as usize || now.saturating_sub(heard_at) > SILENCE {
+            let is_silent = now.saturating_sub(heard_at) > SILENCE;
+            if heard >= milliseconds as usize || is_silent || flow.is_break() {
                 return Ok(std::mem::take(rows));
             }
         }
@@ -127,34 +131,53 @@ impl<'p> Line<'p> {
     /// is not heard.
     pub(super) fn listen(&mut self, milliseconds: u32) -> Result<Vec<Record>, BringupError> {
         self.listener().pass()?;
-        self.listen_and(milliseconds, |_| Ok(()))
+        self.listen_and(milliseconds, |_| Ok(ControlFlow::Continue(())))
     }
 
     /// The present mode; none while the log is silent.
     pub(super) fn mode(&mut self) -> Result<Option<Mode>, BringupError> {
-        Ok(self.listen(2)?.last().map(|row| row.telemetry.mode))
+        Ok(mode_of(&self.listen(2)?))
     }
 
-    /// Waits until a mode or a fault hold; returns the last mode.
-    fn until(&mut self, wanted: Mode) -> Result<Option<Mode>, BringupError> {
-        let mut last = None;
+    /// Waits until it is idle, holds a fault or is silent; returns the rows until then.
+    fn rest(&mut self) -> Result<Vec<Record>, BringupError> {
+        let mut rows = Vec::new();
         for _ in 0..MODE_MS / 20 {
-            last = self.listen(20)?.last().map(|row| row.telemetry.mode);
-            let held = matches!(last, Some(Mode::FaultHold(_)));
-            if last == Some(wanted) || held || last.is_none() {
+            let heard = self.listen(20)?;
+            let last = heard.last().map(|row| row.telemetry.mode);
+            rows.extend(heard);
+            if matches!(last, None | Some(Mode::Idle | Mode::FaultHold(_))) {
                 break;
             }
         }
-        Ok(last)
+        Ok(rows)
+    }
+
+    /// Resets the controller; returns the rows until it is idle or holds a fault.
+    pub(super) fn reset_rows(&mut self) -> Result<Vec<Record>, BringupError> {
+        // A fault hold lasts a tenth of a second at least.
+        let mut rows = self.listen(150)?;
+        self.client.ask(Request::Reset)?;
+        rows.extend(self.listen(50)?);
+        rows.extend(self.rest()?);
+        Ok(rows)
     }
 
     /// Leaves service mode or fault hold; returns the mode, which is idle if all is well.
     pub(super) fn reset(&mut self) -> Result<Option<Mode>, BringupError> {
-        // A fault hold lasts a tenth of a second at least.
-        self.listen(150)?;
-        self.client.ask(Request::Reset)?;
-        self.listen(50)?;
-        self.until(Mode::Idle)
+        Ok(mode_of(&self.reset_rows()?))
+    }
+
+    /// Sends an operator's command.
+    pub(super) fn command(&mut self, command: Command) -> Result<(), BringupError> {
+        let since = self.listener().now();
+        while self.listener().down(CONSOLE, &[letter(command)])? == 0 {
+            if self.listener().now().saturating_sub(since) > SILENCE {
+                return Err(StoreError::Silent { seconds: SILENCE.as_secs_f64() }.into());
+            }
+            self.listener().pass()?;
+        }
+        Ok(())
     }
 
     /// Leaves the service mode if the board is in it, after a failure: as well as it goes.
@@ -166,23 +189,37 @@ impl<'p> Line<'p> {
 
     /// Waits until the board is idle, after a start by itself.
     pub(super) fn idle(&mut self) -> Result<Option<Mode>, BringupError> {
-        self.until(Mode::Idle)
+        Ok(mode_of(&self.rest()?))
+    }
+
+    /// The mode once the board has started.
+    pub(super) fn started(&mut self) -> Result<Mode, BringupError> {
+        let mode = match self.mode()? {
+            Some(Mode::Boot | Mode::SelfTest | Mode::Zero) => self.idle()?,
+            mode => mode,
+        };
+        mode.ok_or_else(|| StoreError::Silent { seconds: SILENCE.as_secs_f64() }.into())
+    }
+
+    /// What was heard in the present wait.
+    pub(super) fn heard(&mut self) -> &[Record] {
+        &self.listener().rows
     }
 
     /// Asks for a motion, again and again, for so many milliseconds, and for rest afterwards.
-    /// Ends early at a fault. `each` is called meanwhile.
+    /// Ends early at a fault, or when `each`, which is called meanwhile, breaks it off.
     pub(super) fn move_and(
         &mut self,
         duties: ServiceDuties,
         milliseconds: u32,
         rest_ms: u32,
-        mut each: impl FnMut(&mut Self) -> Result<(), BringupError>,
+        mut each: impl FnMut(&mut Self) -> Result<ControlFlow<()>, BringupError>,
     ) -> Result<Motion, BringupError> {
         let mut rows = Vec::new();
         self.client.ask(Request::Service(ServiceDuties::REST))?;
         rows.extend(self.listen(20)?);
-        let mut left = milliseconds;
-        while left > 0 {
+        let (mut left, mut is_over) = (milliseconds, false);
+        while left > 0 && !is_over {
             let part = left.min(REPEAT_MS);
             self.listener().rows.clear();
             match self.client.ask(Request::Service(duties)) {
@@ -193,7 +230,11 @@ impl<'p> Line<'p> {
             let asked = std::mem::take(&mut self.listener().rows);
             let spent = asked.len() as u32;
             rows.extend(asked);
-            rows.extend(self.listen_and(part.saturating_sub(spent), &mut each)?);
+            rows.extend(self.listen_and(part.saturating_sub(spent), |line| {
+                let flow = each(line)?;
+                is_over = flow.is_break();
+                Ok(flow)
+            })?);
             left -= part;
         }
         self.listener().rows.clear();
@@ -213,8 +254,12 @@ impl<'p> Line<'p> {
         milliseconds: u32,
         rest_ms: u32,
     ) -> Result<Motion, BringupError> {
-        self.move_and(duties, milliseconds, rest_ms, |_| Ok(()))
+        self.move_and(duties, milliseconds, rest_ms, |_| Ok(ControlFlow::Continue(())))
     }
+}
+
+fn mode_of(rows: &[Record]) -> Option<Mode> {
+    rows.last().map(|row| row.telemetry.mode)
 }
 
 fn duty(part: f64) -> Duty {

@@ -204,6 +204,10 @@ fn judge(session: &mut Session<'_, '_>, levels: &[(f64, Level)]) -> Vec<Check> {
     };
     if !off(by_spring) {
         session.proposed.rig.preload.slew_n_per_s = rounded;
+        // The outer steps differ by what does not repeat.
+        let repeats = (last.preload - second.preload - first.preload).abs();
+        let within = 0.1 + repeats / (PRESS * (t_2 - t_short));
+        session.measured("preload.slew_n_per_s", rounded, within);
     }
     checks.push(check(
         "preload scale",

@@ -4,7 +4,7 @@ use interstage::log::{Flags, Record};
 use interstage::sense::raw::AngleFrame;
 use interstage::supervise::Mode;
 
-use super::figures::{Scale, angle, counted, mean, output, part, stowed, turned};
+use super::figures::{Scale, TURN, angle, counted, mean, output, part, stowed, turned};
 use super::{Action, BringupError, Check, Sensor, Session, check};
 
 /// `FLASH_OPTR` with its bit `DBANK`. Source: RM0440, 3.7.8.
@@ -211,6 +211,9 @@ fn arm(session: &mut Session<'_, '_>, rows: &[Record]) -> Vec<Check> {
     );
     if near {
         session.proposed.rig.sense.angle_zero_code = zero;
+        // Half a code, and a wall machined to 0.05 mm.
+        let wall = 0.05 / rig.rig.arm_length_mm / std::f64::consts::TAU * TURN;
+        session.measured("sense.angle_zero_code", zero, 0.5 + wall);
     }
     checks.push(check("angle zero", near, shown, &advice));
     checks

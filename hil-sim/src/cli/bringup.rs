@@ -21,6 +21,10 @@ use crate::scenario::{PRESETS, Scenario};
 /// goes on where it ended. The exit code is 1 if a check fails.
 #[derive(Debug, clap::Args)]
 pub struct Args {
+    /// Scenario file that the board holds: its sources are kept in what is proposed.
+    #[arg(value_name = "FILE")]
+    file: Option<PathBuf>,
+
     /// The board: probe, a real one, or board, the emulated one.
     #[arg(long, value_name = "TARGET", default_value = "probe", value_parser = ["board", "probe"])]
     target: String,
@@ -55,6 +59,14 @@ struct Printed<'a> {
     proposed: std::collections::BTreeMap<String, String>,
 }
 
+impl Args {
+    /// What the board is said to hold.
+    pub fn scenario(&self) -> Result<Option<Scenario>, Failure> {
+        let read = |path: &PathBuf| Scenario::resolve(None, Some(path), &[]);
+        Ok(self.file.as_ref().map(read).transpose()?)
+    }
+}
+
 /// Runs the verb.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
     if args.target == "board" {
@@ -63,12 +75,12 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     if !args.mistake.is_empty() {
         return Err(Failure::input("--mistake: only the emulated board has mistakes to choose"));
     }
-    carry_out(args, &mut super::probe::reconnecting()?, &mut person(args))
+    carry_out(args, &mut super::probe::reconnecting()?, &mut person(args.yes))
 }
 
 /// The person at the terminal.
-pub fn person(args: &Args) -> Stdin<io::StdinLock<'static>, io::Stderr> {
-    Stdin::new(io::stdin().lock(), io::stderr(), args.yes)
+pub fn person(yes: bool) -> Stdin<io::StdinLock<'static>, io::Stderr> {
+    Stdin::new(io::stdin().lock(), io::stderr(), yes)
 }
 
 /// Carries it out at this port.
@@ -77,17 +89,25 @@ pub fn carry_out(
     port: &mut dyn Port,
     operator: &mut dyn Operator,
 ) -> Result<Outcome, Failure> {
+    let given = args.scenario()?;
     make_directory(&args.out)?;
     let file = |name: &str| args.out.join(name);
     let mut line = Line::new(port);
     // A board that does not run yet has no parameters to ask for.
-    let expected = match line.held() {
-        Ok(held) => {
+    let expected = match (line.held(), given) {
+        (Ok(held), Some(given)) if held.rig != given.rig => {
+            return Err(Failure::input(
+                "the board holds other parameters than the file: `rig params restore` writes them, \
+                 a reset of the board reads them",
+            ));
+        }
+        (Ok(_), Some(given)) => given,
+        (Ok(held), None) => {
             let preset = PRESETS.iter().find(|preset| **preset == held.name);
             Scenario::of_rig(preset.unwrap_or(&PRESETS[0]), held.rig)
         }
-        Err(crate::params::StoreError::Silent { .. }) => Scenario::default(),
-        Err(error) => return Err(Failure::run(error)),
+        (Err(crate::params::StoreError::Silent { .. }), given) => given.unwrap_or_default(),
+        (Err(error), _) => return Err(Failure::run(error)),
     };
     let state = file("bringup.json");
     let kept = Progress::read(&state, &expected).filter(|_| !args.again);

@@ -20,8 +20,8 @@ const ELSEWHERE: [&str; 4] = ["preset", "spread.", "noise.", "run."];
 /// Reads and changes the parameters that a board, or a file, holds.
 ///
 /// A change is checked before it is sent, and becomes active completely or not at all; a board
-/// uses it from its next start. `restore FILE` names each property of the rig that the file does
-/// not state.
+/// uses it from its next start. `restore FILE` names each property of the rig that nobody has
+/// measured.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(subcommand)]
@@ -141,7 +141,7 @@ pub fn act(args: &Args, store: &mut impl Store) -> Result<Outcome, Failure> {
         }
         Action::Restore { from: Some(path) } => {
             let new = Scenario::resolve(None, Some(path), &[])?;
-            remind(path, &new)?;
+            super::scenario::remind(&path.display().to_string(), &new);
             replace(args, store, &scenario, &new, &stem(path))
         }
         Action::Restore { from: None } => {
@@ -158,30 +158,6 @@ pub fn act(args: &Args, store: &mut impl Store) -> Result<Outcome, Failure> {
             show_changes(args, &held, false, &other, &scenario)
         }
     }
-}
-
-/// Asks for the properties of the rig that the file does not state: no default of them is safe on
-/// another rig than the preset's.
-fn remind(path: &Path, new: &Scenario) -> Result<(), Failure> {
-    let text = std::fs::read_to_string(path).map_err(Failure::input)?;
-    let stated: toml::Table = toml::from_str(&text).map_err(Failure::input)?;
-    let is_stated = |key: &str| {
-        let (section, name) = key.split_once('.').unwrap_or(("", key));
-        stated.get(section).and_then(Value::as_table).is_some_and(|table| table.contains_key(name))
-    };
-    let assumed = |info: &KeyInfo| info.measure && !is_stated(&info.key);
-    let keys: Vec<String> =
-        held_keys(new).into_iter().filter(assumed).map(|info| info.key).collect();
-    if !keys.is_empty() {
-        eprintln!(
-            "{}: does not state these properties of the rig; the preset `{}` stands in for them. \
-             Measure yours and add them: {}",
-            path.display(),
-            new.preset,
-            keys.join(", ")
-        );
-    }
-    Ok(())
 }
 
 /// Makes the rig of `new` active and shows the changes.

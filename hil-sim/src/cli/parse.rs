@@ -5,6 +5,7 @@ use std::process::ExitCode;
 use clap::error::ErrorKind;
 
 use super::failure::one_line;
+use crate::bringup::FARTHEST_MM;
 
 /// Prints help, the version, or the error; the exit code to end with.
 pub(super) fn report(error: &clap::Error) -> ExitCode {
@@ -24,6 +25,12 @@ pub(super) fn report(error: &clap::Error) -> ExitCode {
 pub(super) fn seconds(text: &str) -> Result<f64, &'static str> {
     let read = text.parse().ok().filter(|s: &f64| s.is_finite() && *s > 0.0);
     read.ok_or("expected seconds, a number above 0")
+}
+
+/// Reads the distance of a jog, mm.
+pub(super) fn distance(text: &str) -> Result<f64, String> {
+    let read = text.parse().ok().filter(|mm: &f64| mm.abs() <= FARTHEST_MM && *mm != 0.0);
+    read.ok_or_else(|| format!("expected millimetres, at most {FARTHEST_MM} either way, not 0"))
 }
 
 /// The error as one line, without usage and without the pointer to the help.

@@ -79,6 +79,19 @@ pub struct RunArgs {
     seed: Option<u64>,
 }
 
+/// Says which properties of the rig nobody has measured: no default of them is safe on another rig
+/// than the preset's.
+pub(super) fn remind(what: &str, scenario: &Scenario) {
+    let (keys, preset) = (scenario.assumed(), &scenario.preset);
+    if !keys.is_empty() {
+        let keys = keys.join(", ");
+        eprintln!(
+            "{what}: these properties of the rig are the preset's, `{preset}`, and not measured. \
+             Measure yours, or state a source of each under [sources]: {keys}"
+        );
+    }
+}
+
 /// Reads a seed.
 pub(super) fn seed(text: &str) -> Result<u64, &'static str> {
     text.parse().map_err(|_| "expected a whole number, 0 or more")

@@ -4,7 +4,7 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 
 use super::failure::{Failure, Outcome};
-use super::scenario::RunArgs;
+use super::scenario::{RunArgs, remind};
 use crate::provision::Extra;
 use crate::record::{Bytes, Probed, Source, Virtual};
 use crate::scenario::Scenario;
@@ -44,7 +44,10 @@ impl SourceArgs {
         match self.target.as_str() {
             "sil" => act(&mut Virtual::new(&scenario, attended)?, &scenario),
             "board" => Err(Failure::Elsewhere(Extra::Board)),
-            _ => act(&mut Probed::new(super::probe::reconnecting()?), &scenario),
+            _ => {
+                remind("the rig at the probe", &scenario);
+                act(&mut Probed::new(super::probe::reconnecting()?), &scenario)
+            }
         }
     }
 

@@ -100,6 +100,25 @@ impl Merged {
     }
 }
 
+/// The section `sources` of a file: a text for each key.
+pub(super) fn sources(
+    origin: &str,
+    stated: Value,
+) -> Result<BTreeMap<String, String>, ScenarioError> {
+    let sources: BTreeMap<String, String> = stated.clone().try_into().map_err(|_| {
+        let expected = "a text for each key, as in \"tread.tau_s\" = \"0.11 to 0.12, by its logs\"";
+        ScenarioError::wrong(origin, "sources", stated, expected)
+    })?;
+    let known: Vec<String> = super::Scenario::default().keys().into_iter().map(|i| i.key).collect();
+    match sources.keys().find(|key| !known.contains(key)) {
+        Some(key) => {
+            let hint = keys::hint(key, &known);
+            Err(ScenarioError::unknown_key(origin, &format!("sources.{key}"), &hint))
+        }
+        None => Ok(sources),
+    }
+}
+
 pub(super) fn read(path: &Path) -> Result<(String, Table), ScenarioError> {
     let name = path.display().to_string();
     let text = std::fs::read_to_string(path)
