@@ -8,18 +8,18 @@ mod pins;
 mod stray;
 
 use super::peripherals::Peripheral;
-use super::peripherals::adc::{self, Adc};
-use super::peripherals::dma::{CHANNELS, Dma, Dmamux, Move};
+use super::peripherals::adc::Adc;
+use super::peripherals::dma::{self, CHANNELS, Dma, Move};
 use super::peripherals::encoder::Encoder;
 use super::peripherals::exti::Exti;
 use super::peripherals::flash::{Change, Flash};
 use super::peripherals::gpio::Gpio;
 use super::peripherals::iwdg::Iwdg;
 use super::peripherals::pwm::Pwm;
-use super::peripherals::pwr::{self, Pwr, Then};
-use super::peripherals::rcc::{self, Cause, Rcc};
-use super::peripherals::registers::{Kept, Registers};
-use super::peripherals::spi::{self, AngleSensor, Spi};
+use super::peripherals::pwr::{Pwr, Then};
+use super::peripherals::rcc::{Cause, Rcc};
+use super::peripherals::registers::Registers;
+use super::peripherals::spi::{AngleSensor, Spi};
 use super::peripherals::syscfg::Syscfg;
 use super::peripherals::system::{Counter, System};
 use super::peripherals::time_base::TimeBase;
@@ -27,13 +27,14 @@ use super::peripherals::time_base::TimeBase;
 pub use pins::{Bridge, Motor, Pin};
 pub use stray::{Stray, Strays, Why};
 
+use description::{DBGMCU, adc1, dbgmcu::*, spi1};
 use map::Block;
 
 /// External interrupt line of the voltage detector.
 const SUPPLY_LINE: u32 = 16;
 
 /// `DBGMCU_IDCODE`: category 3, revision X.
-const DEBUG_IDENTITY: Kept = Kept { offset: 0, reset: 0x2003_6469, mask: 0 };
+const DEBUG_IDENTITY: u32 = 0x2003_6469;
 
 /// Requests of the multiplexer: ADC1 and ADC2.
 const REQUESTS: [u32; 2] = [5, 36];
@@ -86,7 +87,7 @@ pub struct Chip {
     /// ADC3 and ADC4; ADC3 reads the bridges.
     readback: Adc,
     dma: Dma,
-    mux: Dmamux,
+    mux: Registers,
     spi: Spi,
     /// Independent watchdog.
     pub watchdog: Iwdg,
@@ -115,6 +116,8 @@ impl Chip {
             let outside = pins::OUTSIDE[port];
             Gpio::new(port, outside.0, outside.1)
         });
+        let mut debug = Registers::all(DBGMCU, &[]);
+        debug.set(IDCODE, DEBUG_IDENTITY);
         let mut chip = Self {
             system: System::new(vectors),
             counter: Counter::default(),
@@ -131,10 +134,10 @@ impl Chip {
             adc: Adc::default(),
             readback: Adc::default(),
             dma: Dma::default(),
-            mux: Dmamux::default(),
+            mux: dma::multiplexer(),
             spi: Spi::default(),
             watchdog: Iwdg::default(),
-            debug: Registers::new(&[DEBUG_IDENTITY], &[0x04, 0x08, 0x0C, 0x10], &[]),
+            debug,
             angle: AngleSensor::default(),
             deselected: false,
             wheel: 0,
@@ -242,20 +245,20 @@ impl Chip {
     /// A debugger halts the core for so many cycles from `now` on: what the freeze bits name
     /// stands still with it. Source: RM0440, `DBGMCU_APB1FZR1` and `DBGMCU_APB2FZR`.
     pub(crate) fn halt(&mut self, cycles: u64, now: u64) {
-        let frozen = [self.debug.get(0x08), self.debug.get(0x10)];
         self.system.tick.freeze(cycles);
         self.counter.freeze(cycles);
-        if frozen[0] & 1 != 0 {
+        if self.debug.has(apb1l_fz::DBG_TIMER2_STOP) {
             self.time.freeze(cycles, now);
         }
-        if frozen[0] & 1 << 5 != 0 {
+        if self.debug.has(apb1l_fz::DBG_TIM7_STOP) {
             self.basic.freeze(cycles, now);
         }
-        if frozen[0] & 1 << 12 != 0 {
+        if self.debug.has(apb1l_fz::DBG_IWDG_STOP) {
             self.watchdog.freeze(cycles);
         }
-        for (motor, bit) in self.motors.iter_mut().zip([11, 13]) {
-            if frozen[1] >> bit & 1 != 0 {
+        let stops = [apb2_fz::DBG_TIM1_STOP, apb2_fz::DBG_TIM8_STOP];
+        for (motor, stop) in self.motors.iter_mut().zip(stops) {
+            if self.debug.has(stop) {
                 motor.freeze(true, cycles, now);
             }
         }
@@ -286,7 +289,7 @@ impl Chip {
             return None;
         }
         (0..CHANNELS).find_map(|channel| {
-            let request = self.mux.request(channel);
+            let request = dma::request(&self.mux, channel);
             let source = REQUESTS.iter().position(|known| *known == request)?;
             if requested[source] { self.dma.due(channel) } else { None }
         })
@@ -308,8 +311,8 @@ impl Chip {
     fn settle_after(&mut self, block: Block, offset: u32, write: bool, now: u64) {
         // Reading a data register changes state.
         let by_reading = match block {
-            Block::Adc => offset & 0xFF == adc::DR,
-            Block::Spi => offset == spi::DR,
+            Block::Adc => offset % 0x100 == adc1::DR,
+            Block::Spi => offset == spi1::DR,
             _ => false,
         };
         match block {

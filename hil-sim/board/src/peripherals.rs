@@ -7,7 +7,8 @@
 //!
 //! To add one: implement [`Peripheral`] in a file here (`read` and `write` by offset, `None` for a
 //! register that does not exist; `deadline` and `advance` if something happens by itself; registers
-//! that only keep what is written go into a table of `Kept`). Add its address and clock in
+//! that only keep what is written go into [`registers::Registers`], by the names of
+//! `chip/description.rs`). Add its address and clock in
 //! `chip/map.rs`, a field in `Chip` and an arm in `Chip::block`; its interrupt line, deadline and DMA
 //! requests in `Chip::settle_lines`; its pins in `chip/pins.rs`. Test it against the register
 //! description; in a run `unmodelled` must stay empty.
@@ -46,6 +47,11 @@ impl Write {
     /// The register afterwards.
     pub const fn onto(self, old: u32) -> u32 {
         old & !self.mask | self.value & self.mask
+    }
+
+    /// The bits written as 0.
+    pub const fn zeros(self) -> u32 {
+        !self.value & self.mask
     }
 
     /// The bits written as 1, for registers in which the others do nothing.

@@ -74,19 +74,9 @@ pub struct RunOptions {
     pub wait_states: bool,
 }
 
-/// Runs a scenario on the board with the image in `elf`, and keeps `rows` if that is true.
-/// `watch` gets each line of the log with its time, s.
+/// Runs a scenario on the board with the image in `elf`. `watch` gets each line of the log with
+/// its time, s.
 pub fn run(
-    elf: &[u8],
-    scenario: &Scenario,
-    rows: bool,
-    watch: impl FnMut(f64, &Line),
-) -> Result<Ran, BoardError> {
-    run_with(elf, scenario, &RunOptions { rows, ..RunOptions::default() }, watch)
-}
-
-/// The same with all options.
-pub fn run_with(
     elf: &[u8],
     scenario: &Scenario,
     options: &RunOptions,

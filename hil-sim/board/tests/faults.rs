@@ -8,9 +8,8 @@ use hil_sim::scenario::injection::{Entry, HARDWARE, Injection, Kind, Target};
 use rig_board::bench::Bench;
 use rig_board::campaign::{self, Firmware};
 use rig_board::chip::map::PARAMETER_SETS;
-use rig_board::run::run;
 
-use crate::common::{elf, strings};
+use crate::common::{elf, ran, strings};
 
 fn matrix(wanted: &[&str]) -> Outcome {
     let named = |case: &Case| wanted.contains(&case.name().as_str());
@@ -134,7 +133,7 @@ fn a_scenario_s_faults_come_on_the_board_too() {
     let mut scenario = Scenario::default();
     let off = Injection::at(Target::EncoderLineB, Kind::Off, 0.0, 0.0);
     scenario.run.faults = vec![Injection { at_s: None, at_mm: Some(10.0), ..off }];
-    let summary = run(elf(), &scenario, false, |_, _| {}).expect("a run").recording.summary;
+    let summary = ran(&scenario, false).recording.summary;
     assert_eq!(summary.faults.iter().map(|fault| fault.code).collect::<Vec<_>>(), [123]);
     assert!(!summary.completed && (10.0..14.0).contains(&summary.travel_mm), "{summary:?}");
     assert_eq!(summary.injected, ["encoder-line-b off from 10 mm"]);

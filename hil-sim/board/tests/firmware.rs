@@ -12,9 +12,8 @@ use rig_board::chip::Pin;
 use rig_board::core::{Access, Bus};
 use rig_board::faults::Fault;
 use rig_board::peripherals::rcc::Cause;
-use rig_board::run::{self, Ran};
 
-use crate::common::{Board, elf, scenario};
+use crate::common::{Board, ran, scenario};
 
 fn press(board: &mut Board, pressed: bool) {
     let now = board.machine().now();
@@ -32,10 +31,6 @@ fn drives(board: &mut Board, milliseconds: u32) -> bool {
         let drives = board.step().drives;
         drives.drive_on && drives.drive != 0.0 || drives.preload_on && drives.preload != 0.0
     })
-}
-
-fn ran(sets: &[&str]) -> Ran {
-    run::run(elf(), &scenario(sets), false, |_, _| {}).expect("a run")
 }
 
 /// Rows of the binary log, a tick each.
@@ -141,7 +136,7 @@ fn assert_alike(board: &Recording, scenario: &Scenario) {
 }
 
 fn assert_as_in_software(sets: &[&str]) {
-    let first = ran(sets);
+    let first = ran(&scenario(sets), false);
     assert_alike(&first.recording, &scenario(sets));
     assert!(first.load.unmodelled.is_empty(), "{:#?}", first.load.unmodelled);
     assert!(first.machine.restarts().is_empty());
@@ -152,7 +147,7 @@ fn assert_as_in_software(sets: &[&str]) {
     let ticks = first.load.cycles / first.load.clock_hz.div_euclid(1000);
     assert!(first.load.tick.runs.abs_diff(ticks) <= 1, "{} of {ticks}", first.load.tick.runs);
     // Again, the same bytes.
-    let again = ran(sets);
+    let again = ran(&scenario(sets), false);
     let (a, b) = (&again.recording, &first.recording);
     assert_eq!(a.summary.trace_digest, b.summary.trace_digest);
     assert_eq!(a.log, b.log);
@@ -162,9 +157,8 @@ fn assert_as_in_software(sets: &[&str]) {
 #[test]
 fn other_rigs_run_on_the_board_as_in_software() {
     for seed in 2..=5 {
-        let sets = [&*format!("run.seed={seed}")];
-        let board = run::run(elf(), &scenario(&sets), false, |_, _| {}).expect("a run");
-        assert_alike(&board.recording, &scenario(&sets));
+        let scenario = scenario(&[&format!("run.seed={seed}")]);
+        assert_alike(&ran(&scenario, false).recording, &scenario);
     }
 }
 
@@ -174,7 +168,7 @@ fn other_rigs_run_on_the_board_as_in_software() {
 fn a_restart_under_way_ends_the_run_with_its_cause() {
     let mut scenario = scenario(&[]);
     scenario.run.faults = vec![Injection::at(Target::Supply, Kind::Weak, 2.0, 0.0)];
-    let ran = run::run(elf(), &scenario, true, |_, _| {}).expect("a run");
+    let ran = ran(&scenario, true);
     let (summary, rows) = (&ran.recording.summary, &ran.recording.rows);
     assert!(!summary.completed && summary.total_s < 4.0, "{}", summary.total_s);
     let cause = summary.restart.as_deref().expect("it is reported");
@@ -209,7 +203,7 @@ fn a_deployment_is_far_ahead_of_the_rig() {
     }
     let ahead = |_| {
         let begun = cpu_time::ThreadTime::now();
-        let load = ran(&["run.seed=1"]).load;
+        let load = ran(&scenario(&["run.seed=1"]), false).load;
         load.cycles as f64 / load.clock_hz as f64 / begun.elapsed().as_secs_f64()
     };
     let best = (0..3).map(ahead).fold(0.0, f64::max);

@@ -12,9 +12,8 @@ use interstage::tick::Event;
 use interstage::units::Q16;
 use rig_board::bench::STEP;
 use rig_board::peripherals::rcc::Cause;
-use rig_board::run;
 
-use crate::common::{Board, elf, scenario};
+use crate::common::{Board, ran, scenario};
 
 /// How far the log may be from the truth during a run. Position: the tolerance of the steps'
 /// places, which the controller knows from its table and corrects itself by. Preload: two
@@ -25,7 +24,7 @@ const PRELOAD_N: f64 = 1.0;
 #[test]
 fn every_tick_of_a_run_is_logged_and_runs_again_on_this_host() {
     for sets in [&["run.seed=1"][..], &["run.seed=1", "run.direction=retract"]] {
-        let ran = run::run(elf(), &scenario(sets), true, |_, _| {}).expect("a run");
+        let ran = ran(&scenario(sets), true);
         let run = Run::of_stream(&ran.recording.stream);
         assert!(run.is_complete(), "{:?}", run.marks);
         assert_eq!(run.ledger.len(), 3);

@@ -25,16 +25,15 @@ struct Program {
 /// Address of a register.
 fn address(register: &str) -> u32 {
     let (peripheral, name) = register.split_once('.').expect("PERIPHERAL.REGISTER");
-    description::find(peripheral, name).unwrap_or_else(|| panic!("{register}")).address
+    description::find(peripheral, name).unwrap_or_else(|| panic!("{register}")).0
 }
 
 /// A field's value in its place.
 fn field(register: &str, name: &str, value: u32) -> u32 {
     let (peripheral, register) = register.split_once('.').expect("PERIPHERAL.REGISTER");
-    let register = description::find(peripheral, register).expect("described");
+    let (_, register) = description::find(peripheral, register).expect("described");
     let field = register.fields.iter().find(|field| field.name == name);
-    let mask = field.unwrap_or_else(|| panic!("{name}")).mask;
-    value << mask.trailing_zeros() & mask
+    field.unwrap_or_else(|| panic!("{name}")).at(value)
 }
 
 impl Program {

@@ -1,12 +1,13 @@
 //! Accesses of the core and of DMA to the chip's registers, with the rules between blocks.
 
+use super::Chip;
 use super::description;
+use super::description::{rcc, tim2};
 use super::map::{self, Block, Place};
 use super::stray::Why;
-use super::{Chip, pwr, rcc};
 use crate::core::{Access, Bus};
 use crate::exceptions::number::NMI;
-use crate::peripherals::{Peripheral, Write};
+use crate::peripherals::Write;
 use crate::rules::Rule;
 
 impl Chip {
@@ -24,25 +25,24 @@ impl Chip {
         Some(place)
     }
 
-    /// Notes the rule that the last access to a block broke.
-    fn note_broken_rule(
-        &mut self,
-        block: Block,
-        register: (&'static str, u32),
-        access: Access,
-        write: bool,
-    ) {
+    /// After an access that a model took or not: notes what was wrong with it, and updates what
+    /// it can have changed.
+    fn close(&mut self, place: Place, access: Access, write: bool, taken: bool) {
+        let Place { block, offset, name, .. } = place;
         if let Some(rule) = self.block(block).take_broken_rule() {
-            self.strays.note(register, access, write, Why::Broken(rule));
+            self.strays.note((name, offset), access, write, Why::Broken(rule));
         }
+        if !taken {
+            self.strays.note((name, offset), access, write, Why::NoModel);
+        }
+        self.settle_after(block, offset, write, access.now);
     }
 
     /// The rule between several blocks that this write would break.
     fn broken_rule(&mut self, block: Block, offset: u32, write: Write, now: u64) -> Option<Rule> {
         match (block, offset) {
             (Block::Rcc, rcc::CFGR) => {
-                let wait_states = self.flash.read(0, now)? & 0xF;
-                let boosts = self.power.read(pwr::CR5, now)? & pwr::R1MODE == 0;
+                let (wait_states, boosts) = (self.flash.wait_states(), self.power.boosts());
                 self.rcc.broken_rule(write, wait_states, boosts, now)
             }
             _ => None,
@@ -61,18 +61,15 @@ impl Bus for Chip {
     }
 
     fn read(&mut self, access: Access) -> u32 {
-        let Some(Place { block, offset, name, .. }) = self.target(access, false) else { return 0 };
-        let word = self.block(block).read(offset, access.now);
-        self.note_broken_rule(block, (name, offset), access, false);
-        self.settle_after(block, offset, false, access.now);
-        if word.is_none() {
-            self.strays.note((name, offset), access, false, Why::NoModel);
-        }
+        let Some(place) = self.target(access, false) else { return 0 };
+        let word = self.block(place.block).read(place.offset, access.now);
+        self.close(place, access, false, word.is_some());
         word.unwrap_or(0) >> (8 * (access.address & 3)) & lowest(access.size)
     }
 
     fn write(&mut self, access: Access, value: u32) {
-        let Some(Place { block, offset, name, .. }) = self.target(access, true) else { return };
+        let Some(place) = self.target(access, true) else { return };
+        let Place { block, offset, name, .. } = place;
         let (shift, kept) = (8 * (access.address & 3), lowest(access.size));
         let mut write = Write { value: (value & kept) << shift, mask: kept << shift };
         let (known, reserved) = description::writable(access.address & !3, write.ones());
@@ -83,16 +80,13 @@ impl Bus for Chip {
         write.value &= known;
         if let Some(rule) = self.broken_rule(block, offset, write, access.now) {
             self.strays.note((name, offset), access, true, Why::Broken(rule));
-            if rule.accepted().is_none() {
+            if !rule.is_accepted() {
                 return;
             }
         }
-        let sticks = self.defects.timer_flags_stick && (block, offset) == (Block::Time, 0x10);
-        if !sticks && self.block(block).write(offset, write, access.now).is_none() {
-            self.strays.note((name, offset), access, true, Why::NoModel);
-        }
-        self.note_broken_rule(block, (name, offset), access, true);
-        self.settle_after(block, offset, true, access.now);
+        let sticks = self.defects.timer_flags_stick && (block, offset) == (Block::Time, tim2::SR);
+        let taken = sticks || self.block(block).write(offset, write, access.now).is_some();
+        self.close(place, access, true, taken);
     }
 
     fn read_spoilt(&mut self, access: Access) {

@@ -1,5 +1,7 @@
 //! Address map, and the clock of each block.
 
+use super::description::rcc::{ahb1enr, ahb2enr, apb1enr1, apb2enr};
+use super::description::*;
 use crate::peripherals::rcc::Rcc;
 use interstage::params::slots::SLOT_BYTES;
 
@@ -40,44 +42,43 @@ pub(super) const RANGES: [(u32, u32); 6] = [
     (0xE004_2000, 0x1000),
 ];
 
-/// Clock enable registers of the RCC.
-const AHB1: u32 = 0x48;
-const AHB2: u32 = 0x4C;
-const APB1: u32 = 0x58;
-const APB2: u32 = 0x60;
-
-/// Enable register and bit of a clock.
-type Clock = (u32, u32);
-/// A clock that is always on, or not modelled.
-const ON: Clock = (0, 0);
-
+/// The bit that enables a block's clock; none if that is always on, or not modelled.
+type Clock = Option<Field>;
 /// First address, bytes, block, name in the reference manual, clock. Source: RM0440, table 3
 /// and chapter 7.
 const BLOCKS: [(u32, u32, Block, &str, Clock); 19] = [
-    (0x4000_0000, 0x400, Block::Time, "TIM2", (APB1, 0)),
-    (0x4000_0C00, 0x400, Block::Encoder, "TIM5", (APB1, 3)),
-    (0x4000_1400, 0x400, Block::Basic, "TIM7", (APB1, 5)),
-    (0x4000_3000, 0x400, Block::Watchdog, "IWDG", ON),
-    (0x4000_7000, 0x400, Block::Pwr, "PWR", (APB1, 28)),
-    (0x4001_0000, 0x030, Block::Syscfg, "SYSCFG", (APB2, 0)),
-    (0x4001_0400, 0x400, Block::Exti, "EXTI", ON),
-    (0x4001_2C00, 0x400, Block::Motor(0), "TIM1", (APB2, 11)),
-    (0x4001_3000, 0x400, Block::Spi, "SPI1", (APB2, 12)),
-    (0x4001_3400, 0x400, Block::Motor(1), "TIM8", (APB2, 13)),
-    (0x4002_0000, 0x400, Block::Dma, "DMA1", (AHB1, 0)),
-    (0x4002_0800, 0x400, Block::Mux, "DMAMUX", (AHB1, 2)),
-    (0x4002_1000, 0x400, Block::Rcc, "RCC", ON),
-    (0x4002_2000, 0x400, Block::Flash, "FLASH", ON),
-    (0x5000_0000, 0x400, Block::Adc, "ADC12", (AHB2, 13)),
-    (0x5000_0400, 0x400, Block::Readback, "ADC345", (AHB2, 14)),
-    (0xE000_1000, 0x1000, Block::Counter, "DWT", ON),
-    (0xE000_E000, 0x1000, Block::System, "SCS", ON),
-    (0xE004_2000, 0x400, Block::Debug, "DBGMCU", ON),
+    (TIM2.address, 0x400, Block::Time, "TIM2", Some(apb1enr1::TIM2EN)),
+    (TIM5.address, 0x400, Block::Encoder, "TIM5", Some(apb1enr1::TIM5EN)),
+    (TIM7.address, 0x400, Block::Basic, "TIM7", Some(apb1enr1::TIM7EN)),
+    (IWDG.address, 0x400, Block::Watchdog, "IWDG", None),
+    (PWR.address, 0x400, Block::Pwr, "PWR", Some(apb1enr1::PWREN)),
+    (SYSCFG.address, 0x030, Block::Syscfg, "SYSCFG", Some(apb2enr::SYSCFGEN)),
+    (EXTI.address, 0x400, Block::Exti, "EXTI", None),
+    (TIM1.address, 0x400, Block::Motor(0), "TIM1", Some(apb2enr::TIM1EN)),
+    (SPI1.address, 0x400, Block::Spi, "SPI1", Some(apb2enr::SPI1EN)),
+    (TIM8.address, 0x400, Block::Motor(1), "TIM8", Some(apb2enr::TIM8EN)),
+    (DMA1.address, 0x400, Block::Dma, "DMA1", Some(ahb1enr::DMA1EN)),
+    (DMAMUX.address, 0x400, Block::Mux, "DMAMUX", Some(ahb1enr::DMAMUX1EN)),
+    (RCC.address, 0x400, Block::Rcc, "RCC", None),
+    (FLASH.address, 0x400, Block::Flash, "FLASH", None),
+    (ADC1.address, 0x400, Block::Adc, "ADC12", Some(ahb2enr::ADC12EN)),
+    (ADC3.address, 0x400, Block::Readback, "ADC345", Some(ahb2enr::ADC345EN)),
+    (0xE000_1000, 0x1000, Block::Counter, "DWT", None),
+    (0xE000_E000, 0x1000, Block::System, "SCS", None),
+    (DBGMCU.address, 0x400, Block::Debug, "DBGMCU", None),
 ];
 
-const PORTS: u32 = 0x4800_0000;
+/// The ports, one after the other, with their clocks.
+const PORTS: [(Peripheral, Field); 7] = [
+    (GPIOA, ahb2enr::GPIOAEN),
+    (GPIOB, ahb2enr::GPIOBEN),
+    (GPIOC, ahb2enr::GPIOCEN),
+    (GPIOD, ahb2enr::GPIODEN),
+    (GPIOE, ahb2enr::GPIOEEN),
+    (GPIOF, ahb2enr::GPIOFEN),
+    (GPIOG, ahb2enr::GPIOGEN),
+];
 const PORT_BYTES: u32 = 0x400;
-const PORT_NAMES: [&str; 7] = ["GPIOA", "GPIOB", "GPIOC", "GPIOD", "GPIOE", "GPIOF", "GPIOG"];
 
 /// A word of a block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -93,17 +94,17 @@ pub(super) struct Place {
 impl Place {
     /// Whether the block's clock is on; without it a register reads as zero and ignores writes.
     pub(super) fn is_clocked(&self, rcc: &Rcc) -> bool {
-        self.clock == ON || rcc.is_clocked(self.clock.0, self.clock.1)
+        self.clock.is_none_or(|enable| rcc.is_clocked(enable))
     }
 }
 
 /// The word at an address.
 pub(super) fn find(address: u32) -> Option<Place> {
-    if let Some(offset) = address.checked_sub(PORTS)
-        && offset < 7 * PORT_BYTES
+    if let Some(offset) = address.checked_sub(GPIOA.address)
+        && let Some((of, clock)) = PORTS.get((offset / PORT_BYTES) as usize)
     {
         let (port, offset) = ((offset / PORT_BYTES) as usize, offset % PORT_BYTES);
-        let (name, clock) = (PORT_NAMES[port], (AHB2, port as u32));
+        let (name, clock) = (of.name, Some(*clock));
         return Some(Place { block: Block::Port(port), offset, name, clock });
     }
     let after = BLOCKS.partition_point(|(base, ..)| *base <= address);

@@ -43,7 +43,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     let options = RunOptions { rows: directory.is_some(), wait_states: true };
     let ran = {
         let _progress = (!args.log).then(|| progress::spinner(scenario.run.direction.name()));
-        run::run_with(&elf, &scenario, &options, show).map_err(Failure::run)?
+        run::run(&elf, &scenario, &options, show).map_err(Failure::run)?
     };
     let missed = ran.load.missed();
     let mut files = Vec::new();

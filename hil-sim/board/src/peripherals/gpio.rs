@@ -2,25 +2,13 @@
 //!
 //! Source: RM0440, 9.3 (functions) and 9.4 (registers).
 
-use super::registers::{Kept, Registers};
+use super::registers::Registers;
 use super::{Peripheral, Write};
+use crate::chip::description;
+use crate::chip::description::{GPIOA, GPIOB, GPIOC, GPIOD, GPIOE, GPIOF, GPIOG, gpioc::*};
 
-const MODER: u32 = 0x00;
-const PUPDR: u32 = 0x0C;
-const IDR: u32 = 0x10;
-const ODR: u32 = 0x14;
-const BSRR: u32 = 0x18;
-const AFRL: u32 = 0x20;
-const BRR: u32 = 0x28;
-
-const ALL: u32 = u32::MAX;
-
-/// Everything but input, set and reset; the values after reset are those of ports C to G.
-const REGISTERS: [Kept; 3] = [
-    Kept { offset: MODER, reset: ALL, mask: ALL },
-    Kept { offset: 0x04, reset: 0, mask: 0xFFFF },
-    Kept { offset: ODR, reset: 0, mask: 0xFFFF },
-];
+/// The ports: those with pins of the debug probe have values of their own after reset.
+const PORTS: [description::Peripheral; 7] = [GPIOA, GPIOB, GPIOC, GPIOD, GPIOE, GPIOF, GPIOG];
 
 /// What a pin does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,16 +35,8 @@ impl Gpio {
     /// Port number `port` (0 is A) after reset; `driven` and `levels` say what the world
     /// outside does with the pins.
     pub fn new(port: usize, driven: u32, levels: u32) -> Self {
-        let mut registers = Registers::new(&REGISTERS, &[0x08, PUPDR, AFRL, AFRL + 4], &[]);
-        // The pins of the debug probe.
-        let (mode, speed, pull) = match port {
-            0 => (0xABFF_FFFF, 0x0C00_0000, 0x6400_0000),
-            1 => (0xFFFF_FEBF, 0xC0, 0x100),
-            _ => (ALL, 0, 0),
-        };
-        registers.set(MODER, mode);
-        registers.set(0x08, speed);
-        registers.set(PUPDR, pull);
+        let whole = [MODER, OTYPER, OSPEEDR, PUPDR, ODR, AFRL, AFRH];
+        let registers = Registers::of(PORTS[port], &whole, &[(BSRR, 0), (BRR, 0)]);
         Self { registers, driven, levels }
     }
 
@@ -109,7 +89,6 @@ impl Peripheral for Gpio {
                 let high = |pin: &u32| self.role(*pin) != Role::Analog && self.level(*pin);
                 Some((0..16).filter(high).fold(0, |word, pin| word | 1 << pin))
             }
-            BSRR | BRR => Some(0),
             _ => self.registers.read(offset),
         }
     }
@@ -132,7 +111,7 @@ mod tests {
     use super::*;
 
     fn write(port: &mut Gpio, offset: u32, value: u32) {
-        port.write(offset, Write { value, mask: ALL }, 0).expect("modelled");
+        port.write(offset, Write { value, mask: u32::MAX }, 0).expect("modelled");
     }
 
     #[test]
@@ -167,7 +146,7 @@ mod tests {
     fn the_alternate_function_is_told() {
         let mut port = Gpio::new(0, 0, 0);
         write(&mut port, MODER, 0b10 << 18);
-        write(&mut port, AFRL + 4, 6 << 4);
+        write(&mut port, AFRH, 6 << 4);
         assert_eq!(port.role(9), Role::Alternate(6));
         assert_eq!(port.role(8), Role::Input);
     }

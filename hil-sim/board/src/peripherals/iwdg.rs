@@ -1,12 +1,7 @@
 //! The independent watchdog, on its own oscillator of 32 kHz.
 
 use super::{HZ, Peripheral, Write};
-
-const KR: u32 = 0x00;
-const PR: u32 = 0x04;
-const RLR: u32 = 0x08;
-const SR: u32 = 0x0C;
-const WINR: u32 = 0x10;
+use crate::chip::description::{bits, iwdg::*};
 
 /// Nominal frequency of its oscillator, Hz.
 pub const LSI_HZ: u64 = 32_000;
@@ -17,7 +12,7 @@ pub const LSI_RANGE_HZ: [u64; 2] = [29_500, 34_000];
 const UPDATE: u64 = 5;
 
 /// Of the status: an update of prescaler and reload value is in progress.
-const UPDATING: u32 = 3;
+const UPDATING: u32 = bits(&[sr::PVU, sr::RVU]);
 
 /// Prescaler and reload value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -150,7 +145,7 @@ impl Peripheral for Iwdg {
 
     fn write(&mut self, offset: u32, write: Write, now: u64) -> Option<()> {
         let written = self.written;
-        match (offset, write.value & 0xFFFF) {
+        match (offset, kr::KEY.of(write.value)) {
             (KR, key) => {
                 self.open = key == 0x5555;
                 match key {
@@ -159,10 +154,14 @@ impl Peripheral for Iwdg {
                     _ => {}
                 }
             }
-            (PR, value) if self.open => self.set(Time { prescaler: value & 7, ..written }, now),
-            (RLR, value) if self.open => self.set(Time { reload: value & 0xFFF, ..written }, now),
+            (PR, value) if self.open => {
+                self.set(Time { prescaler: pr::PR.of(value), ..written }, now)
+            }
+            (RLR, value) if self.open => {
+                self.set(Time { reload: rlr::RL.of(value), ..written }, now)
+            }
             // A window that forbids early refreshes is not modelled.
-            (WINR, value) if value & 0xFFF != 0xFFF => return None,
+            (WINR, value) if winr::WIN.of(value) != winr::WIN.mask => return None,
             (WINR, _) => self.refresh(now),
             (PR | RLR, _) => {}
             _ => return None,

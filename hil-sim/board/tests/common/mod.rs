@@ -13,6 +13,7 @@ use rig_board::faults::Fault;
 use rig_board::log::Strings;
 use rig_board::machine::Machine;
 use rig_board::peripherals::rcc::Cause;
+use rig_board::run::{self, Ran, RunOptions};
 
 /// The image as it would be flashed.
 pub(crate) fn elf() -> &'static [u8] {
@@ -30,6 +31,12 @@ pub(crate) fn strings() -> &'static Strings {
 pub(crate) fn scenario(sets: &[&str]) -> Scenario {
     let sets: Vec<String> = sets.iter().map(|set| (*set).to_owned()).collect();
     Scenario::resolve(Some("prototype"), None, &sets).expect("a scenario")
+}
+
+/// A run of a scenario, with its rows if wanted.
+pub(crate) fn ran(scenario: &Scenario, rows: bool) -> Ran {
+    let options = RunOptions { rows, ..RunOptions::default() };
+    run::run(elf(), scenario, &options, |_, _| {}).expect("a run")
 }
 
 /// A running board with its two logs.
