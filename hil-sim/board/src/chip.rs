@@ -27,8 +27,9 @@ use super::peripherals::time_base::TimeBase;
 pub use pins::{Bridge, Motor, Pin};
 pub use stray::{Stray, Strays, Why};
 
-use description::{DBGMCU, adc1, dbgmcu::*, spi1};
-use map::Block;
+use description::{ADC1, DBGMCU, EXTI, FLASH, GPIOA, GPIOG, PWR, SPI1, SYSCFG, TIM1, TIM8};
+use description::{adc1, dbgmcu::*, spi1};
+use map::Place;
 
 /// External interrupt line of the voltage detector.
 const SUPPLY_LINE: u32 = 16;
@@ -307,32 +308,22 @@ impl Chip {
         self.settle_lines(now);
     }
 
-    /// The same after an access to one block, for the lines that it can change.
-    fn settle_after(&mut self, block: Block, offset: u32, write: bool, now: u64) {
+    /// The same after an access to a register, for the lines that it can change.
+    fn settle_after(&mut self, Place { block, offset }: Place, write: bool, now: u64) {
         // Reading a data register changes state.
-        let by_reading = match block {
-            Block::Adc => offset % 0x100 == adc1::DR,
-            Block::Spi => offset == spi1::DR,
-            _ => false,
-        };
-        match block {
-            Block::Port(_)
-            | Block::Syscfg
-            | Block::Motor(_)
-            | Block::Exti
-            | Block::Pwr
-            | Block::Flash
-                if write =>
-            {
-                if matches!(block, Block::Port(_)) {
-                    self.look_at_wheel();
-                }
-                self.settle(now);
+        let by_reading =
+            block.is(ADC1) && offset % 0x100 == adc1::DR || block.is(SPI1) && offset == spi1::DR;
+        let is_port = (GPIOA.address..=GPIOG.address).contains(&block.base);
+        let pins = [SYSCFG, TIM1, TIM8, EXTI, PWR, FLASH];
+        if write && (is_port || pins.into_iter().any(|of| block.is(of))) {
+            if is_port {
+                self.look_at_wheel();
             }
+            self.settle(now);
+        } else if block.base == map::CORE && (0x100..0x500).contains(&offset) {
             // The interrupt controller updates itself.
-            Block::System if (0x100..0x500).contains(&offset) => {}
-            _ if write || by_reading => self.settle_lines(now),
-            _ => {}
+        } else if write || by_reading {
+            self.settle_lines(now);
         }
     }
 
@@ -377,31 +368,6 @@ impl Chip {
         self.deadline = due.into_iter().min().unwrap_or(u64::MAX);
         if self.reset.is_some() || self.next_move().is_some() {
             self.deadline = now;
-        }
-    }
-
-    /// The registers of a block.
-    fn block(&mut self, block: Block) -> &mut dyn Peripheral {
-        match block {
-            Block::Time => &mut self.time,
-            Block::Basic => &mut self.basic,
-            Block::Encoder => &mut self.encoder,
-            Block::Motor(index) => &mut self.motors[index],
-            Block::Watchdog => &mut self.watchdog,
-            Block::Pwr => &mut self.power,
-            Block::Syscfg => &mut self.syscfg,
-            Block::Exti => &mut self.exti,
-            Block::Spi => &mut self.spi,
-            Block::Dma => &mut self.dma,
-            Block::Mux => &mut self.mux,
-            Block::Rcc => &mut self.rcc,
-            Block::Flash => &mut self.flash,
-            Block::Port(index) => &mut self.ports[index],
-            Block::Adc => &mut self.adc,
-            Block::Readback => &mut self.readback,
-            Block::Counter => &mut self.counter,
-            Block::System => &mut self.system,
-            Block::Debug => &mut self.debug,
         }
     }
 }

@@ -62,13 +62,9 @@ impl Image {
 
     /// Reads words from the mailbox.
     pub fn get<const N: usize>(&self, address: u32) -> Result<[u32; N], ImageError> {
-        let mut words = [0; N];
-        for (index, word) in words.iter_mut().enumerate() {
-            let mut bytes = [0; 4];
-            self.core.read(address + 4 * index as u32, &mut bytes)?;
-            *word = u32::from_le_bytes(bytes);
-        }
-        Ok(words)
+        let mut bytes = vec![[0; 4]; N];
+        self.core.read(address, bytes.as_flattened_mut())?;
+        Ok(std::array::from_fn(|index| u32::from_le_bytes(bytes[index])))
     }
 
     /// Address of a function, for [`Image::call`].

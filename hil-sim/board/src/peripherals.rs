@@ -8,10 +8,9 @@
 //! To add one: implement [`Peripheral`] in a file here (`read` and `write` by offset, `None` for a
 //! register that does not exist; `deadline` and `advance` if something happens by itself; registers
 //! that only keep what is written go into [`registers::Registers`], by the names of
-//! `chip/description.rs`). Add its address and clock in
-//! `chip/map.rs`, a field in `Chip` and an arm in `Chip::block`; its interrupt line, deadline and DMA
-//! requests in `Chip::settle_lines`; its pins in `chip/pins.rs`. Test it against the register
-//! description; in a run `unmodelled` must stay empty.
+//! `chip/description.rs`). Add a field in `Chip`, a line in `chip/map.rs`; its interrupt line,
+//! deadline and DMA requests in `Chip::settle_lines`; its pins in `chip/pins.rs`. Test it against the
+//! register description; in a run `unmodelled` must stay empty.
 
 pub mod adc;
 pub mod dma;

@@ -22,6 +22,15 @@ struct Program {
     now: u64,
 }
 
+/// What a program does.
+#[derive(Clone, Copy)]
+enum Step {
+    /// Lets so many cycles pass.
+    Wait(u64),
+    /// Reads a register, changes fields, writes it back.
+    Set(&'static str, &'static [(&'static str, u32)]),
+}
+
 /// Address of a register.
 fn address(register: &str) -> u32 {
     let (peripheral, name) = register.split_once('.').expect("PERIPHERAL.REGISTER");
@@ -79,6 +88,13 @@ impl Program {
         self.write(register, next);
     }
 
+    fn take(&mut self, step: Step) {
+        match step {
+            Step::Wait(cycles) => self.wait(cycles),
+            Step::Set(register, fields) => self.set(register, fields),
+        }
+    }
+
     /// Lets time pass.
     fn wait(&mut self, cycles: u64) {
         self.now += cycles;
@@ -106,7 +122,9 @@ impl Program {
         program.set("ADC1.CR", &[("DEEPPWD", 0), ("ADVREGEN", 1)]);
         program.wait(20 * US);
         program.set("ADC1.CR", &[("ADCAL", 1)]);
-        program.wait(116 * 4);
+        program.wait(116 * 4 - 1);
+        assert!(program.is_set("ADC1.CR", "ADCAL"), "it takes its time");
+        program.wait(1);
         assert!(!program.is_set("ADC1.CR", "ADCAL"));
         program
     }
@@ -146,24 +164,35 @@ fn a_break_clears_moe_after_its_filter_and_keeps_it_cleared() {
 #[test]
 fn clocks_are_ready_after_their_time_and_used_when_they_are_ready() {
     let mut program = Program::new();
+    program.set("RCC.PLLCFGR", &PLL);
     program.set("RCC.CR", &[("PLLON", 1)]);
+    program.set("PWR.CR5", &[("R1MODE", 0)]);
+    program.set("FLASH.ACR", &[("LATENCY", 4)]);
+    program.set("RCC.CFGR", &[("HPRE", 8)]);
+    program.set("RCC.CFGR", &[("SW", 3)]);
+    let used = |program: &mut Program| {
+        (program.is_set("RCC.CR", "PLLRDY"), program.read("RCC.CFGR") >> 2 & 3)
+    };
     program.wait(40 * US - 1);
-    assert!(!program.is_set("RCC.CR", "PLLRDY"));
+    assert_eq!(used(&mut program), (false, 1), "HSI until then");
     program.wait(1);
-    assert!(program.is_set("RCC.CR", "PLLRDY"));
+    assert_eq!(used(&mut program), (true, 3));
     program.set("RCC.CSR", &[("LSION", 1)]);
     assert!(!program.is_set("RCC.CSR", "LSIRDY"));
     program.wait(130 * US);
     assert!(program.is_set("RCC.CSR", "LSIRDY"));
-    program.set("RCC.CR", &[("HSION", 0)]);
+    program.set("RCC.CR", &[("PLLON", 0)]);
     program.assert_broken(Rule::ClockInUse);
 }
 
-/// A PLL of 170 MHz; then what its use lacks.
+/// A PLL of 170 MHz.
+const PLL: [(&str, u32); 5] =
+    [("PLLSRC", 2), ("PLLM", 3), ("PLLN", 85), ("PLLR", 0), ("PLLREN", 1)];
+
+/// The core on that PLL, but for what the steps lack.
 fn fast(steps: &[&str]) -> Program {
     let mut program = Program::new();
-    let pll = [("PLLSRC", 2), ("PLLM", 3), ("PLLN", 85), ("PLLR", 0), ("PLLREN", 1)];
-    program.set("RCC.PLLCFGR", &pll);
+    program.set("RCC.PLLCFGR", &PLL);
     program.set("RCC.CR", &[("PLLON", 1)]);
     program.wait(40 * US);
     if steps.contains(&"boost") {

@@ -1,9 +1,10 @@
 //! What the chip and the sensor on its bus do by their manuals, and a firmware has to know.
 
-use hil_sim::scenario::Scenario;
 use interstage::restart::Stopped;
-use rig_board::bench::{Bench, STEP};
-use rig_board::chip::{Pin, description};
+use rig_board::bench::STEP;
+use rig_board::chip::Pin;
+use rig_board::chip::description::flash::{self, acr};
+use rig_board::chip::description::{self, rcc};
 use rig_board::core::{Access, Bus, Register};
 use rig_board::faults::Fault;
 use rig_board::machine::Machine;
@@ -13,12 +14,7 @@ use rig_board::peripherals::pwr::Then;
 use rig_board::peripherals::rcc::Cause;
 use rig_board::peripherals::{HZ, Peripheral};
 
-use crate::common::{Board, elf, strings};
-
-/// Of the flash's access control register: wait states, prefetch, instruction and data cache.
-const ACCESS: u32 = 0x00;
-const WAIT_STATES: u32 = 0xF;
-const PREFETCH_AND_CACHES: u32 = 7 << 8;
+use crate::common::Board;
 
 #[test]
 fn a_disturbed_frame_of_the_angle_sensor_costs_that_frame_alone() {
@@ -72,10 +68,10 @@ fn the_data_cache_is_off_whenever_flash_is_written() {
 #[test]
 fn flash_is_read_with_prefetch_caches_and_the_wait_states_of_its_clock() {
     let mut board = Board::idle();
-    let access = board.machine().chip_mut().flash.read(ACCESS, 0).expect("a register");
+    let access = board.machine().chip_mut().flash.read(flash::ACR, 0).expect("a register");
     // Source: RM0440, number of wait states: 4 from 136 MHz on.
-    assert_eq!(access & WAIT_STATES, 4);
-    assert_eq!(access & PREFETCH_AND_CACHES, PREFETCH_AND_CACHES);
+    assert_eq!(acr::LATENCY.of(access), 4);
+    assert!([acr::PRFTEN, acr::ICEN, acr::DCEN].iter().all(|field| field.is_in(access)));
 }
 
 #[test]
@@ -239,9 +235,9 @@ fn the_start_at_the_slow_clock_takes_a_fiftieth_of_a_second() {
     let machine = board.machine();
     let clock_in_use = |machine: &mut Machine| {
         let now = machine.now();
-        machine.chip_mut().rcc.read(CLOCK_IN_USE, now).expect("a register") >> 2 & 3
+        machine.chip_mut().rcc.read(rcc::CFGR, now).expect("a register")
     };
-    while clock_in_use(machine) == 1 {
+    while rcc::cfgr::SWS.of(clock_in_use(machine)) == 1 {
         machine.run_on(machine.now() + 1000).expect("runs");
     }
     let slow_ms = machine.now() as f64 / 16e3;
@@ -352,52 +348,6 @@ fn the_system_timer_preempts_every_interrupt_but_the_supply_s() {
     assert_eq!(urgent, [u32::from(supply)]);
 }
 
-/// The bit of `memcpy` after which no start comes to its first word.
-fn dark() -> Bench<'static> {
-    let mut bench = Bench::new(elf(), strings(), &Scenario::default()).expect("a bench");
-    for _ in 0..3000 {
-        let (_, lines) = bench.step().expect("runs");
-        if lines.iter().any(|line| line.text.contains("mode: idle")) {
-            break;
-        }
-    }
-    let functions = &bench.machine.image().functions;
-    let copies = functions.iter().find(|f| f.name == "compiler_builtins::mem::memcpy");
-    let place = copies.expect("it copies").range.start + 0x115;
-    Fault::BitFlip(place, 4).strike(&mut bench.machine).expect("flash");
-    bench.machine.restart(Cause::Pin).expect("restarts");
-    bench
-}
-
-/// Cycles in a second: of the oscillator that the chip starts on, and of its full clock. The
-/// emulated core counts both alike.
-const CLOCKS_HZ: [f64; 2] = [16e6, HZ as f64];
-/// `RCC_CFGR`: bits 2 and 3 say which clock is in use, 1 the oscillator.
-const CLOCK_IN_USE: u32 = 0x08;
-
-#[test]
-fn the_light_of_a_damaged_image_blinks_twice_a_second() {
-    let mut bench = dark();
-    let (mut before, mut time_s) = (false, 0.0);
-    let mut rises = Vec::new();
-    for _ in 0..600 {
-        bench.step().expect("runs");
-        let chip = bench.machine.chip_mut();
-        let clock = chip.rcc.read(CLOCK_IN_USE, 0).expect("a register") >> 2 & 3;
-        time_s += STEP as f64 / CLOCKS_HZ[usize::from(clock != 1)];
-        let on = chip.level(Pin::LIGHT);
-        if on && !before {
-            rises.push(time_s);
-        }
-        before = on;
-    }
-    let periods: Vec<f64> = rises.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    assert!(periods.len() >= 4, "{rises:?}");
-    assert!(periods.iter().all(|period| (0.45..=0.56).contains(period)), "{periods:.2?} s");
-}
-
-/// Of the flash: the ECC register.
-const ECC: u32 = 0x18;
 /// A function that runs every millisecond.
 const EVERY_MILLISECOND: &str = "safety::look_at";
 
@@ -430,7 +380,7 @@ fn one_wrong_bit_in_code_that_runs_is_corrected() {
     board.strike(Fault::WrongBits(place, Wrong::One));
     board.until("mode: deployed", 20_000);
     assert!(!board.said("] fault ") && board.machine().restarts().is_empty());
-    let ecc = board.machine().chip_mut().flash.read(ECC, 0).expect("a register");
+    let ecc = board.machine().chip_mut().flash.read(flash::ECCR, 0).expect("a register");
     assert_eq!(ecc >> 30, 1, "it was read, and corrected");
 }
 

@@ -1,14 +1,12 @@
 //! Accesses of the core and of DMA to the chip's registers, with the rules between blocks.
 
 use super::Chip;
-use super::description;
-use super::description::{rcc, tim2};
-use super::map::{self, Block, Place};
+use super::description::{self, RCC, TIM2, rcc, tim2};
+use super::map::{self, Place};
 use super::stray::Why;
 use crate::core::{Access, Bus};
 use crate::exceptions::number::NMI;
 use crate::peripherals::Write;
-use crate::rules::Rule;
 
 impl Chip {
     /// The register of an access, if a model with a clock answers it. Other accesses are noted.
@@ -18,8 +16,8 @@ impl Chip {
             self.strays.note(register, access, write, Why::NoModel);
             return None;
         };
-        if !place.is_clocked(&self.rcc) {
-            self.strays.note((place.name, place.offset), access, write, Why::NoClock);
+        if !place.block.is_clocked(&self.rcc) {
+            self.strays.note((place.block.name, place.offset), access, write, Why::NoClock);
             return None;
         }
         Some(place)
@@ -28,25 +26,14 @@ impl Chip {
     /// After an access that a model took or not: notes what was wrong with it, and updates what
     /// it can have changed.
     fn close(&mut self, place: Place, access: Access, write: bool, taken: bool) {
-        let Place { block, offset, name, .. } = place;
-        if let Some(rule) = self.block(block).take_broken_rule() {
-            self.strays.note((name, offset), access, write, Why::Broken(rule));
+        let register = (place.block.name, place.offset);
+        if let Some(rule) = (place.block.model)(self).take_broken_rule() {
+            self.strays.note(register, access, write, Why::Broken(rule));
         }
         if !taken {
-            self.strays.note((name, offset), access, write, Why::NoModel);
+            self.strays.note(register, access, write, Why::NoModel);
         }
-        self.settle_after(block, offset, write, access.now);
-    }
-
-    /// The rule between several blocks that this write would break.
-    fn broken_rule(&mut self, block: Block, offset: u32, write: Write, now: u64) -> Option<Rule> {
-        match (block, offset) {
-            (Block::Rcc, rcc::CFGR) => {
-                let (wait_states, boosts) = (self.flash.wait_states(), self.power.boosts());
-                self.rcc.broken_rule(write, wait_states, boosts, now)
-            }
-            _ => None,
-        }
+        self.settle_after(place, write, access.now);
     }
 }
 
@@ -62,30 +49,33 @@ impl Bus for Chip {
 
     fn read(&mut self, access: Access) -> u32 {
         let Some(place) = self.target(access, false) else { return 0 };
-        let word = self.block(place.block).read(place.offset, access.now);
+        let word = (place.block.model)(self).read(place.offset, access.now);
         self.close(place, access, false, word.is_some());
         word.unwrap_or(0) >> (8 * (access.address & 3)) & lowest(access.size)
     }
 
     fn write(&mut self, access: Access, value: u32) {
         let Some(place) = self.target(access, true) else { return };
-        let Place { block, offset, name, .. } = place;
+        let Place { block, offset } = place;
         let (shift, kept) = (8 * (access.address & 3), lowest(access.size));
         let mut write = Write { value: (value & kept) << shift, mask: kept << shift };
         let (known, reserved) = description::writable(access.address & !3, write.ones());
         if reserved != 0 {
-            self.strays.note((name, offset), access, true, Why::Reserved(reserved));
+            self.strays.note((block.name, offset), access, true, Why::Reserved(reserved));
         }
         write.mask &= known;
         write.value &= known;
-        if let Some(rule) = self.broken_rule(block, offset, write, access.now) {
-            self.strays.note((name, offset), access, true, Why::Broken(rule));
-            if !rule.is_accepted() {
-                return;
+        if block.is(RCC) && offset == rcc::CFGR {
+            let (wait_states, boosts) = (self.flash.wait_states(), self.power.boosts());
+            if let Some(rule) = self.rcc.broken_rule(write, wait_states, boosts, access.now) {
+                self.strays.note((block.name, offset), access, true, Why::Broken(rule));
+                if !rule.is_accepted() {
+                    return;
+                }
             }
         }
-        let sticks = self.defects.timer_flags_stick && (block, offset) == (Block::Time, tim2::SR);
-        let taken = sticks || self.block(block).write(offset, write, access.now).is_some();
+        let sticks = self.defects.timer_flags_stick && block.is(TIM2) && offset == tim2::SR;
+        let taken = sticks || (block.model)(self).write(offset, write, access.now).is_some();
         self.close(place, access, true, taken);
     }
 

@@ -10,16 +10,20 @@ use crate::core::Access;
 use crate::rules::Rule;
 
 /// What is wrong with an access.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, thiserror::Error)]
 #[serde(rename_all = "snake_case")]
 pub enum Why {
     /// No model implements the register, or this use of it.
+    #[error("not modelled")]
     NoModel,
     /// The peripheral's clock is off.
+    #[error("clock off")]
     NoClock,
     /// These bits, written as 1, are reserved.
+    #[error("reserved bits {0:#x}")]
     Reserved(u32),
     /// The access broke a rule of the chip.
+    #[error("{0}")]
     Broken(Rule),
 }
 
@@ -44,15 +48,9 @@ pub struct Stray {
 
 impl fmt::Display for Stray {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { peripheral, register, name, write, count, pc, .. } = self;
+        let Self { peripheral, register, name, write, why, count, pc } = self;
         let access = if *write { "write to" } else { "read of" };
         let gap = if name.is_empty() { "" } else { " " };
-        let why = match self.why {
-            Why::NoModel => "not modelled".to_owned(),
-            Why::NoClock => "clock off".to_owned(),
-            Why::Reserved(bits) => format!("reserved bits {bits:#x}"),
-            Why::Broken(rule) => rule.to_string(),
-        };
         write!(
             f,
             "{access} {peripheral}{gap}{name} {register:#05x}: {why}, {count} times, first at {pc:#010x}"

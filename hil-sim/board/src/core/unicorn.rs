@@ -281,14 +281,8 @@ impl<B: Bus + 'static> UnicornCore<B> {
         engine("map the bus", mapped)
     }
 
-    /// Runs from `address` until a hook stops it, it gets to `until`, or it has executed so many
-    /// instructions, if that is not 0.
-    fn go(
-        &mut self,
-        address: u32,
-        cycles: u64,
-        (until, instructions): (u64, usize),
-    ) -> Result<Stop, CoreError> {
+    /// Runs from `address` until a hook stops it or it gets to `until`.
+    fn go(&mut self, address: u32, cycles: u64, until: u64) -> Result<Stop, CoreError> {
         self.choose_hooks()?;
         let count = &mut self.engine.get_data_mut().count;
         count.stop = None;
@@ -297,7 +291,7 @@ impl<B: Bus + 'static> UnicornCore<B> {
         count.next = address & !1;
         let mut address = address;
         let ended = loop {
-            let ended = self.engine.emu_start(u64::from(address | 1), until, 0, instructions);
+            let ended = self.engine.emu_start(u64::from(address | 1), until, 0, 0);
             let count = &self.engine.get_data().count;
             match count.stop {
                 Some(Stop::Spent(at)) if !count.wanted.is_empty() => address = at,
@@ -381,13 +375,13 @@ impl<B: Bus + 'static> UnicornCore<B> {
 
     /// Runs from `address` until something stops the core, `cycles` at most.
     pub fn run(&mut self, address: u32, cycles: u64) -> Result<Stop, CoreError> {
-        self.go(address, cycles, (u64::MAX, 0))
+        self.go(address, cycles, u64::MAX)
     }
 
     /// The same, or until the program gets to `until`. Slow: the engine translates again.
     pub fn run_to(&mut self, address: u32, cycles: u64, until: u32) -> Result<Stop, CoreError> {
         engine("forget code", self.engine.ctl_flush_tb())?;
-        let stop = self.go(address, cycles, (u64::from(until & !1), 0))?;
+        let stop = self.go(address, cycles, u64::from(until & !1))?;
         engine("forget code", self.engine.ctl_flush_tb())?;
         Ok(match stop {
             Stop::Wait(at) if at & !1 == until & !1 => Stop::Spent(at),

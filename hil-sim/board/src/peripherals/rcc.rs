@@ -221,18 +221,6 @@ mod tests {
     }
 
     #[test]
-    fn a_selected_clock_is_used_once_it_is_ready() {
-        let mut rcc = Rcc::new(Cause::Power, 0);
-        write(&mut rcc, CR, bits(&[cr::PLLON, cr::HSION]));
-        assert_eq!(rcc.read(CR, 0), Some(1 << 24 | 1 << 10 | 1 << 8));
-        write(&mut rcc, CFGR, 3);
-        let locked = 40 * (HZ / 1_000_000);
-        assert_eq!(rcc.read(CFGR, locked - 1), Some(1 << 2 | 3));
-        assert_eq!(rcc.read(CR, locked), Some(1 << 25 | 1 << 24 | 1 << 10 | 1 << 8));
-        assert_eq!(rcc.read(CFGR, locked), Some(0xF));
-    }
-
-    #[test]
     fn the_prescaler_of_the_bus_divides_by_powers_of_two_without_32() {
         let rcc = Rcc::new(Cause::Power, 0);
         for (setting, divider) in [(0, 1), (8, 2), (11, 16), (12, 64), (15, 512)] {
