@@ -89,7 +89,8 @@ pub struct Chip {
     readback: Adc,
     dma: Dma,
     mux: Registers,
-    spi: Spi,
+    /// The angle sensor's bus.
+    pub spi: Spi,
     /// Independent watchdog.
     pub watchdog: Iwdg,
     /// Debug support: its freeze bits act while a debugger halts the core.
@@ -184,11 +185,6 @@ impl Chip {
         self.power = old.power.after_reset(now);
         self.settle(now);
         torn
-    }
-
-    /// Whether a frame is on the angle sensor's bus.
-    pub const fn angle_bus_is_busy(&self) -> bool {
-        self.spi.is_busy()
     }
 
     /// The supply is below the detector's threshold until this cycle.

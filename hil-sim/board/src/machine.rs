@@ -39,7 +39,8 @@ pub struct Machine {
     core: UnicornCore<Chip>,
     pc: u32,
     asleep: Option<Asleep>,
-    profile: Profile,
+    /// Polls of tasks, and sleep.
+    pub profile: Profile,
     tasks: Tasks,
     marks: Vec<Mark>,
     restarts: Vec<(u64, Restart)>,
@@ -101,16 +102,6 @@ impl Machine {
     /// The chip, to change its pins.
     pub fn chip_mut(&mut self) -> &mut Chip {
         self.core.bus_mut()
-    }
-
-    /// Cycles asleep since the start.
-    pub const fn slept(&self) -> u64 {
-        self.profile.slept()
-    }
-
-    /// Polls of tasks, and sleep.
-    pub fn profile_mut(&mut self) -> &mut Profile {
-        &mut self.profile
     }
 
     /// Names of the tasks, by their numbers in the profile.

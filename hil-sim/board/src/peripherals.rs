@@ -28,7 +28,7 @@ pub mod syscfg;
 pub mod system;
 pub mod time_base;
 
-use crate::rules::Rule;
+use crate::chip::Why;
 
 /// The core's clock, Hz.
 pub const HZ: u64 = 170_000_000;
@@ -67,13 +67,9 @@ pub trait Peripheral {
     /// Reads the word at this offset; `None` if no model has it.
     fn read(&mut self, offset: u32, now: u64) -> Option<u32>;
 
-    /// Writes to the word at this offset; `None` if no model has it, or not this use of it.
-    fn write(&mut self, offset: u32, write: Write, now: u64) -> Option<()>;
-
-    /// Takes the rule that the last access broke.
-    fn take_broken_rule(&mut self) -> Option<Rule> {
-        None
-    }
+    /// Writes to the word at this offset, unless no model has it, or not this use of it, or that
+    /// breaks a rule.
+    fn write(&mut self, offset: u32, write: Write, now: u64) -> Result<(), Why>;
 
     /// Cycle at which something is due by itself.
     fn deadline(&self) -> u64 {
@@ -82,4 +78,14 @@ pub trait Peripheral {
 
     /// Does what is due.
     fn advance(&mut self, _now: u64) {}
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Writes a word that the model takes.
+    pub(super) fn write(model: &mut impl Peripheral, offset: u32, value: u32, now: u64) {
+        model.write(offset, Write { value, mask: u32::MAX }, now).expect("modelled");
+    }
 }

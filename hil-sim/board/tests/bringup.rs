@@ -15,7 +15,6 @@ use interstage::supervise::ServiceDuties;
 use interstage::units::Duty;
 use rig_board::bench::Bench;
 use rig_board::bringup::Attended;
-use rig_board::chip::Pin;
 use rig_board::wiring::Mistake;
 use serde_json::Value;
 
@@ -182,10 +181,7 @@ fn the_service_mode_is_refused_in_motion_and_ends_with_the_emergency_stop() {
         board.run(50);
     }
     assert!(board.step().drives.drive > 0.1);
-    let now = board.machine().now();
-    for pin in [Pin::STOP_DRIVE, Pin::STOP_PRELOAD] {
-        board.machine().chip_mut().drive(pin, true, now);
-    }
+    board.open_stop(true);
     board.step();
     assert!(board.step().drives.drive == 0.0);
     board.run(5);

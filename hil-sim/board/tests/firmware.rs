@@ -241,16 +241,10 @@ fn an_open_emergency_stop_takes_the_drive_away_until_it_is_reset() {
     board.send(b's');
     board.until("deploying: cruise", 4000);
     board.run(100);
-    let open = |board: &mut Board, open| {
-        let now = board.bench.machine.now();
-        for pin in [Pin::STOP_DRIVE, Pin::STOP_PRELOAD] {
-            board.machine().chip_mut().drive(pin, open, now);
-        }
-    };
-    open(&mut board, true);
+    board.open_stop(true);
     board.until("fault 151", 20);
     assert!(!drives(&mut board, 200));
-    open(&mut board, false);
+    board.open_stop(false);
     assert!(!drives(&mut board, 200), "closing the contact starts nothing");
     board.send(b'0');
     board.until("mode: idle", 1500);

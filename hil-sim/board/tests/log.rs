@@ -74,7 +74,7 @@ impl Ticks {
     fn gather(&mut self, board: &mut Board) {
         let machine = &mut board.bench.machine;
         let tick = machine.tasks().position(|name| name == "motors").expect("the tick");
-        for turn in machine.profile_mut().take_polls().iter().filter(|turn| turn.task == tick) {
+        for turn in machine.profile.take_polls().iter().filter(|turn| turn.task == tick) {
             self.cycles.push(turn.cycles);
             self.starts.push(turn.began);
         }
@@ -129,7 +129,7 @@ fn deployment(reader: Reader) -> (u32, Crossings, Ticks) {
     }
     board.until("mode: idle", 3000);
     let (mut ticks, mut crossings) = (Ticks::default(), Vec::new());
-    board.bench.machine.profile_mut().take_polls();
+    board.bench.machine.profile.take_polls();
     board.send(b's');
     for millisecond in 0..8000 {
         if reader == Reader::Stalled {
@@ -301,7 +301,7 @@ fn minutes_of_deploying_and_retracting_are_logged_without_a_gap_or_drift() {
             assert!(millisecond < 20_000, "round {round} does not arrive");
             let (_, lines) = board.bench.step().expect("runs");
             // What the emulator books of the tasks is not the board's.
-            board.bench.machine.profile_mut().take_polls();
+            board.bench.machine.profile.take_polls();
             let truth = board.bench.plant.truth();
             let now = (board.bench.time_s() * 1e3).round() as u32;
             truths.push_back((now, truth.position_mm, truth.preload_n));

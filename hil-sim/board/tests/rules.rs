@@ -328,7 +328,8 @@ fn requests_arrive_at_the_interrupts_of_the_description() {
     }
 }
 
-/// What reads as zero shows by its effect: set and reset of the ports, clearing of DMA's flags.
+/// What reads as zero shows by its effect: set and reset of the ports, of which setting goes first,
+/// and clearing of DMA's flags.
 #[test]
 fn commands_act_where_the_description_has_them() {
     let mut program = Program::new();
@@ -342,7 +343,7 @@ fn commands_act_where_the_description_has_them() {
             let [on, off] = ["BS", "BR"].map(|name| field(&set, &format!("{name}{pin}"), 1));
             let off_alone = field(&reset, &format!("BR{pin}"), 1);
             for (register, word, expected) in
-                [(&set, on, high), (&set, off, 0), (&set, on, high), (&reset, off_alone, 0)]
+                [(&set, on, high), (&set, off, 0), (&set, on | off, high), (&reset, off_alone, 0)]
             {
                 program.write(register, word);
                 assert_eq!(program.read(&output), expected, "{register} {pin}");

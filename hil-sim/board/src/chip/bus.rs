@@ -22,19 +22,6 @@ impl Chip {
         }
         Some(place)
     }
-
-    /// After an access that a model took or not: notes what was wrong with it, and updates what
-    /// it can have changed.
-    fn close(&mut self, place: Place, access: Access, write: bool, taken: bool) {
-        let register = (place.block.name, place.offset);
-        if let Some(rule) = (place.block.model)(self).take_broken_rule() {
-            self.strays.note(register, access, write, Why::Broken(rule));
-        }
-        if !taken {
-            self.strays.note(register, access, write, Why::NoModel);
-        }
-        self.settle_after(place, write, access.now);
-    }
 }
 
 /// Bits of an access in the lowest bytes of a word.
@@ -50,7 +37,10 @@ impl Bus for Chip {
     fn read(&mut self, access: Access) -> u32 {
         let Some(place) = self.target(access, false) else { return 0 };
         let word = (place.block.model)(self).read(place.offset, access.now);
-        self.close(place, access, false, word.is_some());
+        if word.is_none() {
+            self.strays.note((place.block.name, place.offset), access, false, Why::NoModel);
+        }
+        self.settle_after(place, false, access.now);
         word.unwrap_or(0) >> (8 * (access.address & 3)) & lowest(access.size)
     }
 
@@ -75,8 +65,10 @@ impl Bus for Chip {
             }
         }
         let sticks = self.defects.timer_flags_stick && block.is(TIM2) && offset == tim2::SR;
-        let taken = sticks || (block.model)(self).write(offset, write, access.now).is_some();
-        self.close(place, access, true, taken);
+        if !sticks && let Err(why) = (block.model)(self).write(offset, write, access.now) {
+            self.strays.note((block.name, offset), access, true, why);
+        }
+        self.settle_after(place, true, access.now);
     }
 
     fn read_spoilt(&mut self, access: Access) {

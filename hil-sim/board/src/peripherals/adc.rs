@@ -12,6 +12,7 @@
 mod converter;
 
 use super::{Peripheral, Write};
+use crate::chip::Why;
 use crate::chip::description::adc1::{CR, ISR};
 use crate::chip::description::adc12_common::{self, ccr};
 use crate::rules::Rule;
@@ -30,13 +31,12 @@ pub struct Adc {
     common: u32,
     /// Codes of 16 bits at the inputs: converter, channel.
     inputs: [[u16; 20]; 2],
-    broken: Option<Rule>,
 }
 
 impl Default for Adc {
     fn default() -> Self {
         let converters = [Converter::new(), Converter::new()];
-        Self { converters, common: 0, inputs: [[0; 20]; 2], broken: None }
+        Self { converters, common: 0, inputs: [[0; 20]; 2] }
     }
 }
 
@@ -71,32 +71,26 @@ impl Peripheral for Adc {
         }
     }
 
-    fn write(&mut self, offset: u32, write: Write, now: u64) -> Option<()> {
+    fn write(&mut self, offset: u32, write: Write, now: u64) -> Result<(), Why> {
         if offset == CCR {
             let next = write.onto(self.common);
             if next != self.common && self.converters.iter().any(Converter::is_enabled) {
-                self.broken = Some(Rule::AdcDisabledOnly);
-            } else {
-                self.common = next;
+                return Err(Why::Broken(Rule::AdcDisabledOnly));
             }
-            return Some(());
+            self.common = next;
+            return Ok(());
         }
         let clock = self.clock();
-        let converter = self.converters.get_mut((offset / STRIDE) as usize)?;
+        let converter = self.converters.get_mut((offset / STRIDE) as usize).ok_or(Why::NoModel)?;
         match offset % STRIDE {
             ISR => {
                 converter.settle(now);
                 converter.registers.clear(ISR, write.ones());
-                Some(())
+                Ok(())
             }
             CR => converter.write_control(write, clock, now),
             offset => converter.configure(offset, write),
         }
-    }
-
-    fn take_broken_rule(&mut self) -> Option<Rule> {
-        let own = self.converters.iter_mut().find_map(|converter| converter.broken.take());
-        own.or(self.broken.take())
     }
 
     fn deadline(&self) -> u64 {

@@ -2,6 +2,7 @@
 
 use super::registers::Registers;
 use super::{Peripheral, Write};
+use crate::chip::Why;
 use crate::chip::description::{Field, TIM5, bits, tim2::*};
 
 /// Registers that the model has in part: two inputs with their filters, and quadrature modes.
@@ -101,15 +102,15 @@ impl Peripheral for Encoder {
         self.registers.read(offset)
     }
 
-    fn write(&mut self, offset: u32, write: Write, _: u64) -> Option<()> {
+    fn write(&mut self, offset: u32, write: Write, _: u64) -> Result<(), Why> {
         match offset {
             // Nothing here raises a flag that could be cleared.
-            SR => Some(()),
+            SR => Ok(()),
             EGR if write.ones() == egr::UG.mask => {
                 self.registers.set(CNT, 0);
-                Some(())
+                Ok(())
             }
-            SMCR if smcr::SMS.of(write.ones()) > 3 => None,
+            SMCR if smcr::SMS.of(write.ones()) > 3 => Err(Why::NoModel),
             _ => self.registers.write(offset, write),
         }
     }

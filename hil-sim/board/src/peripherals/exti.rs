@@ -3,6 +3,7 @@
 
 use super::registers::Registers;
 use super::{Peripheral, Write};
+use crate::chip::Why;
 use crate::chip::description::{EXTI, exti::*};
 
 /// External interrupts. Nothing here drives the lines of the second bank.
@@ -37,7 +38,7 @@ impl Peripheral for Exti {
         self.registers.read(offset)
     }
 
-    fn write(&mut self, offset: u32, write: Write, _: u64) -> Option<()> {
+    fn write(&mut self, offset: u32, write: Write, _: u64) -> Result<(), Why> {
         match offset {
             PR1 => self.registers.clear(PR1, write.ones()),
             SWIER1 => {
@@ -46,7 +47,7 @@ impl Peripheral for Exti {
             }
             _ => return self.registers.write(offset, write),
         }
-        Some(())
+        Ok(())
     }
 }
 

@@ -19,6 +19,7 @@ mod tests;
 
 use super::registers::Registers;
 use super::{HZ, Peripheral, Write};
+use crate::chip::Why;
 use crate::chip::description::{FLASH, bits, flash::*};
 
 use ecc::Ecc;
@@ -214,7 +215,7 @@ impl Flash {
         self.registers.put(optr::DBANK, (!single).into());
     }
 
-    fn write_access(&mut self, write: Write) -> Option<()> {
+    fn write_access(&mut self, write: Write) -> Result<(), Why> {
         let before = self.registers.has(acr::DCEN);
         self.registers.write(ACR, write)?;
         // The content can be reset only while the cache is off.
@@ -224,7 +225,7 @@ impl Flash {
         if !before && self.registers.has(acr::DCEN) {
             self.cache_hazards += u64::from(self.stale);
         }
-        Some(())
+        Ok(())
     }
 
     /// Takes the change of a finished operation.
@@ -242,10 +243,10 @@ impl Flash {
         self.operation.is_some() || self.wanted.is_some()
     }
 
-    fn write_control(&mut self, write: Write, now: u64) -> Option<()> {
+    fn write_control(&mut self, write: Write, now: u64) -> Result<(), Why> {
         // Locked or busy, it ignores writes.
         if self.registers.has(cr::LOCK) || self.is_busy() {
-            return Some(());
+            return Ok(());
         }
         // The locks can be set alone.
         let locks = write.zeros() & bits(&[cr::LOCK, cr::OPTLOCK]);
@@ -257,7 +258,7 @@ impl Flash {
         if cr::STRT.is_in(write.ones()) {
             self.erase(now);
         }
-        Some(())
+        Ok(())
     }
 }
 
@@ -270,7 +271,7 @@ impl Peripheral for Flash {
         }
     }
 
-    fn write(&mut self, offset: u32, write: Write, now: u64) -> Option<()> {
+    fn write(&mut self, offset: u32, write: Write, now: u64) -> Result<(), Why> {
         match offset {
             KEYR => {
                 let next = self.keys.and_then(|taken| KEYS.get(taken).map(|key| (taken, *key)));
@@ -286,7 +287,7 @@ impl Peripheral for Flash {
             CR => self.write_control(write, now)?,
             _ => self.registers.write(offset, write)?,
         }
-        Some(())
+        Ok(())
     }
 
     fn deadline(&self) -> u64 {

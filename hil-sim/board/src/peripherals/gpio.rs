@@ -4,6 +4,7 @@
 
 use super::registers::Registers;
 use super::{Peripheral, Write};
+use crate::chip::Why;
 use crate::chip::description;
 use crate::chip::description::{GPIOA, GPIOB, GPIOC, GPIOD, GPIOE, GPIOF, GPIOG, gpioc::*};
 
@@ -93,7 +94,7 @@ impl Peripheral for Gpio {
         }
     }
 
-    fn write(&mut self, offset: u32, write: Write, _: u64) -> Option<()> {
+    fn write(&mut self, offset: u32, write: Write, _: u64) -> Result<(), Why> {
         let ones = write.ones();
         let old = self.registers.get(ODR);
         match offset {
@@ -102,37 +103,20 @@ impl Peripheral for Gpio {
             BRR => self.registers.set(ODR, old & !ones),
             _ => return self.registers.write(offset, write),
         }
-        Some(())
+        Ok(())
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn write(port: &mut Gpio, offset: u32, value: u32) {
-        port.write(offset, Write { value, mask: u32::MAX }, 0).expect("modelled");
-    }
-
-    #[test]
-    fn an_output_shows_what_was_set_and_setting_goes_first() {
-        let mut port = Gpio::new(2, 0, 0);
-        write(&mut port, MODER, 0b01 << 6);
-        write(&mut port, BSRR, 1 << 3);
-        assert!(port.puts_out(3));
-        write(&mut port, BSRR, 1 << 19);
-        assert!(!port.puts_out(3));
-        write(&mut port, BSRR, 1 << 3 | 1 << 19);
-        assert!(port.puts_out(3));
-        write(&mut port, BRR, 1 << 3);
-        assert!(!port.puts_out(3));
-    }
+    use crate::peripherals::tests::write;
 
     #[test]
     fn an_input_shows_the_world_or_else_its_pull_resistor() {
         let mut port = Gpio::new(2, 0, 0);
-        write(&mut port, MODER, 0);
-        write(&mut port, PUPDR, 0b01 << 8);
+        write(&mut port, MODER, 0, 0);
+        write(&mut port, PUPDR, 0b01 << 8, 0);
         assert_eq!(port.read(IDR, 0), Some(1 << 4));
         port.drive(4, Some(false));
         port.drive(5, Some(true));
@@ -140,14 +124,5 @@ mod tests {
         port.drive(4, None);
         port.drive(5, None);
         assert_eq!(port.read(IDR, 0), Some(1 << 4));
-    }
-
-    #[test]
-    fn the_alternate_function_is_told() {
-        let mut port = Gpio::new(0, 0, 0);
-        write(&mut port, MODER, 0b10 << 18);
-        write(&mut port, AFRH, 6 << 4);
-        assert_eq!(port.role(9), Role::Alternate(6));
-        assert_eq!(port.role(8), Role::Input);
     }
 }

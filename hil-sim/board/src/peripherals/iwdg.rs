@@ -1,6 +1,7 @@
 //! The independent watchdog, on its own oscillator of 32 kHz.
 
 use super::{HZ, Peripheral, Write};
+use crate::chip::Why;
 use crate::chip::description::{bits, iwdg::*};
 
 /// Nominal frequency of its oscillator, Hz.
@@ -143,7 +144,7 @@ impl Peripheral for Iwdg {
         }
     }
 
-    fn write(&mut self, offset: u32, write: Write, now: u64) -> Option<()> {
+    fn write(&mut self, offset: u32, write: Write, now: u64) -> Result<(), Why> {
         let written = self.written;
         match (offset, kr::KEY.of(write.value)) {
             (KR, key) => {
@@ -161,12 +162,12 @@ impl Peripheral for Iwdg {
                 self.set(Time { reload: rlr::RL.of(value), ..written }, now)
             }
             // A window that forbids early refreshes is not modelled.
-            (WINR, value) if winr::WIN.of(value) != winr::WIN.mask => return None,
+            (WINR, value) if winr::WIN.of(value) != winr::WIN.mask => return Err(Why::NoModel),
             (WINR, _) => self.refresh(now),
             (PR | RLR, _) => {}
-            _ => return None,
+            _ => return Err(Why::NoModel),
         }
-        Some(())
+        Ok(())
     }
 
     fn deadline(&self) -> u64 {
@@ -177,10 +178,7 @@ impl Peripheral for Iwdg {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn write(dog: &mut Iwdg, offset: u32, value: u32, now: u64) {
-        dog.write(offset, Write { value, mask: u32::MAX }, now).expect("modelled");
-    }
+    use crate::peripherals::tests::write;
 
     #[test]
     fn it_expires_after_its_time_unless_it_is_refreshed() {

@@ -6,6 +6,7 @@
 use super::encoder::filter_cycles;
 use super::registers::Registers;
 use super::{Peripheral, Write};
+use crate::chip::Why;
 use crate::chip::description::{TIM1, bits, tim1::*};
 
 /// Registers that the model has in part: counting up and edge-aligned, compares without dithering,
@@ -206,7 +207,7 @@ impl Peripheral for Pwm {
         }
     }
 
-    fn write(&mut self, offset: u32, write: Write, now: u64) -> Option<()> {
+    fn write(&mut self, offset: u32, write: Write, now: u64) -> Result<(), Why> {
         self.advance(now);
         match offset {
             SR => {
@@ -250,7 +251,7 @@ impl Peripheral for Pwm {
             }
             _ => self.registers.write(offset, write)?,
         }
-        Some(())
+        Ok(())
     }
 
     fn deadline(&self) -> u64 {
@@ -279,13 +280,10 @@ impl Peripheral for Pwm {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::peripherals::tests::write;
 
     const PERIOD: u64 = 8500;
     const PULSE: u32 = bits(&[cr1::ARPE, cr1::OPM]);
-
-    fn write(timer: &mut Pwm, offset: u32, value: u32, now: u64) {
-        timer.write(offset, Write { value, mask: u32::MAX }, now).expect("modelled");
-    }
 
     fn moe(timer: &mut Pwm) -> bool {
         timer.read(BDTR, 0).is_some_and(|word| bdtr::MOE.is_in(word))

@@ -8,6 +8,7 @@
 
 use super::registers::Registers;
 use super::{HZ, Peripheral, Write};
+use crate::chip::Why;
 use crate::chip::description::{PWR, pwr::*};
 
 /// Least core cycles for which the board's capacitors supply the chip between the detector's
@@ -74,7 +75,7 @@ impl Peripheral for Pwr {
         Some(if offset == SR2 && self.signals_low() { kept | sr2::PVDO.mask } else { kept })
     }
 
-    fn write(&mut self, offset: u32, write: Write, _: u64) -> Option<()> {
+    fn write(&mut self, offset: u32, write: Write, _: u64) -> Result<(), Why> {
         self.registers.write(offset, write)
     }
 

@@ -9,6 +9,7 @@
 
 use super::registers::Registers;
 use super::{HZ, Peripheral, Write};
+use crate::chip::Why;
 use crate::chip::description::{Field, RCC, bits, rcc::*};
 use crate::rules::Rule;
 
@@ -69,7 +70,6 @@ pub struct Rcc {
     ready: [u64; SOURCES.len()],
     /// `SW` of the source in use.
     used: u32,
-    broken: Option<Rule>,
 }
 
 impl Rcc {
@@ -80,12 +80,7 @@ impl Rcc {
         registers.set(CR, cr::HSION.mask);
         registers.set(CFGR, cfgr::SW.at(1));
         registers.set(CSR, cause.flags() | earlier);
-        Self {
-            registers,
-            ready: [0, u64::MAX, u64::MAX, u64::MAX, u64::MAX, u64::MAX],
-            used: 1,
-            broken: None,
-        }
+        Self { registers, ready: [0, u64::MAX, u64::MAX, u64::MAX, u64::MAX, u64::MAX], used: 1 }
     }
 
     /// Flags of earlier resets that were not cleared.
@@ -179,7 +174,7 @@ impl Peripheral for Rcc {
         Some(if offset == CFGR { value | cfgr::SWS.at(self.used) } else { value })
     }
 
-    fn write(&mut self, offset: u32, write: Write, now: u64) -> Option<()> {
+    fn write(&mut self, offset: u32, write: Write, now: u64) -> Result<(), Why> {
         self.settle(now);
         let mut write = write;
         if offset == CSR {
@@ -189,9 +184,8 @@ impl Peripheral for Rcc {
             write.mask &= csr::LSION.mask;
         }
         let old = self.registers.get(offset);
-        self.broken = self.own_rule(offset, old, write.onto(old));
-        if self.broken.is_some() {
-            return Some(());
+        if let Some(rule) = self.own_rule(offset, old, write.onto(old)) {
+            return Err(Why::Broken(rule));
         }
         self.registers.write(offset, write)?;
         for ((on, _, us), ready) in SOURCES.iter().zip(&mut self.ready) {
@@ -204,21 +198,14 @@ impl Peripheral for Rcc {
             }
         }
         self.settle(now);
-        Some(())
-    }
-
-    fn take_broken_rule(&mut self) -> Option<Rule> {
-        self.broken.take()
+        Ok(())
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn write(rcc: &mut Rcc, offset: u32, value: u32) {
-        rcc.write(offset, Write { value, mask: u32::MAX }, 0).expect("modelled");
-    }
+    use crate::peripherals::tests::write;
 
     #[test]
     fn the_prescaler_of_the_bus_divides_by_powers_of_two_without_32() {
@@ -233,7 +220,7 @@ mod tests {
         let power = Rcc::new(Cause::Power, 0);
         let mut rcc = Rcc::new(Cause::Watchdog, power.flags());
         assert_eq!(rcc.read(CSR, 0), Some(1 << 29 | 1 << 27 | 1 << 26));
-        write(&mut rcc, CSR, 1 << 23);
+        write(&mut rcc, CSR, 1 << 23, 0);
         assert_eq!(rcc.read(CSR, 0), Some(0));
     }
 }

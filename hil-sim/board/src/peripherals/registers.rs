@@ -1,6 +1,7 @@
 //! Registers that keep what is written to them.
 
 use super::Write;
+use crate::chip::Why;
 use crate::chip::description::{Field, Peripheral};
 
 /// The value and the writable bits of each register, by word of the block.
@@ -61,15 +62,15 @@ impl Registers {
         field.is_in(self.get(field.register))
     }
 
-    /// Writes a register; `None` if no model has it, or if other bits than it keeps would change.
-    pub fn write(&mut self, offset: u32, write: Write) -> Option<()> {
-        let (value, mask) = self.word(offset)?;
+    /// Writes a register, unless no model has it, or other bits than it keeps would change.
+    pub fn write(&mut self, offset: u32, write: Write) -> Result<(), Why> {
+        let (value, mask) = self.word(offset).ok_or(Why::NoModel)?;
         let next = write.onto(value);
         if (next ^ value) & !mask != 0 {
-            return None;
+            return Err(Why::NoModel);
         }
         self.set(offset, next);
-        Some(())
+        Ok(())
     }
 
     /// Sets every bit of a register.
@@ -95,7 +96,7 @@ impl super::Peripheral for Registers {
         Self::read(self, offset)
     }
 
-    fn write(&mut self, offset: u32, write: Write, _: u64) -> Option<()> {
+    fn write(&mut self, offset: u32, write: Write, _: u64) -> Result<(), Why> {
         Self::write(self, offset, write)
     }
 }
@@ -119,7 +120,7 @@ mod tests {
             (0x400, u32::MAX, u32::MAX, None),
         ] {
             let taken = registers.write(offset, Write { value, mask });
-            assert_eq!(taken, expected.map(|_| ()), "{offset:#x}");
+            assert_eq!(taken.ok(), expected.map(|_| ()), "{offset:#x}");
             let value = registers.read(offset);
             assert!(expected.is_none() || value == expected, "{offset:#x}: {value:?}");
         }

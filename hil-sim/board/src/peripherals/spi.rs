@@ -2,6 +2,7 @@
 
 use super::registers::Registers;
 use super::{Peripheral, Write};
+use crate::chip::Why;
 use crate::chip::description::{SPI1, bits, spi1::*};
 
 mod angle;
@@ -126,7 +127,7 @@ impl Peripheral for Spi {
         }
     }
 
-    fn write(&mut self, offset: u32, write: Write, now: u64) -> Option<()> {
+    fn write(&mut self, offset: u32, write: Write, now: u64) -> Result<(), Why> {
         match offset {
             // Reading clears its flags.
             SR => {}
@@ -138,7 +139,7 @@ impl Peripheral for Spi {
             _ => self.registers.write(offset, write)?,
         }
         self.start(now);
-        Some(())
+        Ok(())
     }
 
     fn deadline(&self) -> u64 {
@@ -149,10 +150,7 @@ impl Peripheral for Spi {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn write(spi: &mut Spi, offset: u32, value: u32, now: u64) {
-        spi.write(offset, Write { value, mask: u32::MAX }, now).expect("modelled");
-    }
+    use crate::peripherals::tests::write;
 
     fn ready() -> Spi {
         let mut spi = Spi::default();

@@ -3,6 +3,7 @@
 
 use super::registers::Registers;
 use super::{Peripheral, Write};
+use crate::chip::Why;
 use crate::chip::description::{SYSCFG, bits, syscfg::*};
 
 /// System configuration.
@@ -39,7 +40,7 @@ impl Peripheral for Syscfg {
         self.0.read(offset)
     }
 
-    fn write(&mut self, offset: u32, write: Write, _: u64) -> Option<()> {
+    fn write(&mut self, offset: u32, write: Write, _: u64) -> Result<(), Why> {
         let set_only = offset == CFGR2;
         // Locks of the break inputs can be set, never taken back.
         let value = if set_only { write.value | self.0.get(CFGR2) } else { write.value };

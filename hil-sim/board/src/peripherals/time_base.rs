@@ -5,6 +5,7 @@
 
 use super::registers::Registers;
 use super::{Peripheral, Write};
+use crate::chip::Why;
 use crate::chip::description::{TIM2, TIM7, bits, tim2::*};
 
 /// Directions, one-pulse mode, alternate clocks: none of them modelled.
@@ -135,7 +136,7 @@ impl TimeBase {
     }
 
     /// Changes a register.
-    fn put(&mut self, offset: u32, write: Write, now: u64) -> Option<()> {
+    fn put(&mut self, offset: u32, write: Write, now: u64) -> Result<(), Why> {
         self.update(now);
         match offset {
             SR => self.registers.clear(SR, write.zeros()),
@@ -157,7 +158,7 @@ impl TimeBase {
             }
             _ => self.registers.write(offset, write)?,
         }
-        Some(())
+        Ok(())
     }
 
     /// Whether it requests its interrupt.
@@ -175,7 +176,7 @@ impl Peripheral for TimeBase {
         }
     }
 
-    fn write(&mut self, offset: u32, write: Write, now: u64) -> Option<()> {
+    fn write(&mut self, offset: u32, write: Write, now: u64) -> Result<(), Why> {
         let taken = self.put(offset, write, now);
         self.schedule();
         taken
@@ -193,10 +194,7 @@ impl Peripheral for TimeBase {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn write(timer: &mut TimeBase, offset: u32, value: u32, now: u64) {
-        timer.write(offset, Write { value, mask: u32::MAX }, now).expect("modelled");
-    }
+    use crate::peripherals::tests::write;
 
     /// At 1 MHz with 16 bits from cycle 1000 on.
     fn running() -> TimeBase {
@@ -246,6 +244,9 @@ mod tests {
     #[test]
     fn counting_down_is_not_modelled() {
         let mut timer = TimeBase::default();
-        assert_eq!(timer.write(CR1, Write { value: cr1::DIR.mask, mask: u32::MAX }, 0), None);
+        assert_eq!(
+            timer.write(CR1, Write { value: cr1::DIR.mask, mask: u32::MAX }, 0),
+            Err(Why::NoModel)
+        );
     }
 }

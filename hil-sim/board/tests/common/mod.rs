@@ -2,12 +2,15 @@
 
 use std::sync::OnceLock;
 
+use hil_sim::faults::campaign::{Case, FaultCampaign, Outcome, Twin};
 use hil_sim::firmware::{self, Profile};
 use hil_sim::record::Run;
 use hil_sim::scenario::Scenario;
 use interstage::restart::Restart;
 use interstage::tick::Event;
 use rig_board::bench::{Bench, Passed};
+use rig_board::campaign::{self, Firmware};
+use rig_board::chip::Pin;
 use rig_board::core::Register;
 use rig_board::faults::Fault;
 use rig_board::log::Strings;
@@ -37,6 +40,19 @@ pub(crate) fn scenario(sets: &[&str]) -> Scenario {
 pub(crate) fn ran(scenario: &Scenario, rows: bool) -> Ran {
     let options = RunOptions { rows, ..RunOptions::default() };
     run::run(elf(), scenario, &options, |_, _| {}).expect("a run")
+}
+
+/// Tries these faults on the board, so many instants each: none is undetected or harmful.
+pub(crate) fn tried(cases: Vec<Case>, instants: usize) -> Outcome {
+    let firmware = Firmware { elf: elf(), strings: strings() };
+    let campaign = FaultCampaign { scenario: Scenario::default(), instants, cases };
+    let rigs = campaign.rigs(|scenario| campaign::twin(firmware, scenario), &|| {});
+    let watched = |scenario: &Scenario, twin: &Twin| campaign::watched(firmware, scenario, twin);
+    let outcome = campaign.on("board", &rigs.expect("rigs"), watched).complete(&|| {});
+    let outcome = outcome.expect("a campaign");
+    let failures: Vec<_> = outcome.matrix.iter().flat_map(|line| &line.failures).collect();
+    assert_eq!((outcome.undetected, outcome.unheld), (0, 0), "{failures:#?}");
+    outcome
 }
 
 /// A running board with its two logs.
@@ -110,6 +126,14 @@ impl Board {
         for _ in 0..milliseconds {
             let drives = self.step().drives;
             assert!(!drives.drive_on && !drives.preload_on);
+        }
+    }
+
+    /// Opens or closes the contact of the emergency stop.
+    pub(crate) fn open_stop(&mut self, open: bool) {
+        let now = self.machine().now();
+        for pin in [Pin::STOP_DRIVE, Pin::STOP_PRELOAD] {
+            self.machine().chip_mut().drive(pin, open, now);
         }
     }
 

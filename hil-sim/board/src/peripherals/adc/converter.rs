@@ -1,5 +1,6 @@
 //! One converter: its registers, and its conversions in their times.
 
+use crate::chip::Why;
 use crate::chip::description::{ADC1, Field, adc1::*, bits};
 use crate::peripherals::registers::Registers;
 use crate::peripherals::{HZ, Write};
@@ -37,7 +38,6 @@ pub(super) struct Converter {
     pub(super) rested: u64,
     pub(super) ready: u64,
     pub(super) calibrated: bool,
-    pub(super) broken: Option<Rule>,
 }
 
 impl Converter {
@@ -50,7 +50,6 @@ impl Converter {
             rested: 0,
             ready: u64::MAX,
             calibrated: false,
-            broken: None,
         }
     }
 
@@ -85,11 +84,11 @@ impl Converter {
     }
 
     /// Writes to a configuration register.
-    pub(super) fn configure(&mut self, offset: u32, write: Write) -> Option<()> {
-        let old = self.registers.read(offset)?;
+    pub(super) fn configure(&mut self, offset: u32, write: Write) -> Result<(), Why> {
+        let old = self.registers.read(offset).ok_or(Why::NoModel)?;
         let changes = write.onto(old) != old;
-        self.broken = match offset {
-            DR | JDR1..=JDR4 => return None,
+        let broken = match offset {
+            DR | JDR1..=JDR4 => return Err(Why::NoModel),
             // The queue of injected conversions is not written while they run.
             JSQR if changes && self.registers.has(cr::JADSTART) => Some(Rule::AdcConfiguration),
             // Interrupts, the queue and calibration factors have rules of their own.
@@ -98,7 +97,7 @@ impl Converter {
             _ if changes && self.converts() => Some(Rule::AdcConfiguration),
             _ => None,
         };
-        if self.broken.is_some() { Some(()) } else { self.registers.write(offset, write) }
+        broken.map_or_else(|| self.registers.write(offset, write), |rule| Err(Why::Broken(rule)))
     }
 
     /// Channel of the regular conversion, or of the injected one of this rank.
@@ -141,16 +140,15 @@ impl Converter {
         (sum >> shift) as u32 & 0xFFFF
     }
 
-    pub(super) fn write_control(&mut self, write: Write, clock: u64, now: u64) -> Option<()> {
+    pub(super) fn write_control(&mut self, write: Write, clock: u64, now: u64) -> Result<(), Why> {
         let ones = write.ones();
         let command = |field: Field| field.is_in(ones);
         // Stopping injected conversions is not modelled.
         if command(cr::JADSTP) {
-            return None;
+            return Err(Why::NoModel);
         }
-        self.broken = self.broken_command(ones, clock, now);
-        if self.broken.is_some() {
-            return Some(());
+        if let Some(rule) = self.broken_command(ones, clock, now) {
+            return Err(Why::Broken(rule));
         }
         let levels = bits(&[cr::ADVREGEN, cr::DEEPPWD, cr::ADCALDIF]);
         self.registers.write(CR, Write { mask: write.mask & levels, ..write })?;
@@ -183,7 +181,7 @@ impl Converter {
         if command(cr::ADSTART) && self.is_enabled() && idle {
             // A sequence of several, or started by hardware, is not modelled.
             if [sqr1::L, cfgr::EXTEN, cfgr::RES].iter().any(|field| self.registers.has(*field)) {
-                return None;
+                return Err(Why::NoModel);
             }
             self.registers.put(cr::ADSTART, 1);
             self.done = now + self.cycles(None, clock);
@@ -191,12 +189,12 @@ impl Converter {
         if command(cr::JADSTART) && self.is_enabled() && !self.registers.has(cr::JADSTART) {
             // Between regular ones, or started by hardware, is not modelled.
             if !idle || self.registers.has(jsqr::JEXTEN) {
-                return None;
+                return Err(Why::NoModel);
             }
             self.registers.put(cr::JADSTART, 1);
             self.injected = Some((0, now + self.cycles(Some(0), clock)));
         }
-        Some(())
+        Ok(())
     }
 
     pub(super) fn read(&mut self, offset: u32, now: u64) -> Option<u32> {

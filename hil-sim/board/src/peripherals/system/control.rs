@@ -1,6 +1,7 @@
 //! The system control block: vectors, faults and their status, reset by software.
 
 use super::Write;
+use crate::chip::Why;
 use crate::core::Fault;
 use crate::exceptions::Exceptions;
 use crate::exceptions::number::{
@@ -152,7 +153,7 @@ impl Control {
         write: Write,
         exceptions: &mut Exceptions,
         now: u64,
-    ) -> Option<()> {
+    ) -> Result<(), Why> {
         match offset {
             ICSR => {
                 for (bit, number) in [(28, PEND_SV), (26, SYS_TICK)] {
@@ -172,10 +173,10 @@ impl Control {
             CFSR => self.faults &= !write.ones(),
             HFSR => self.hard &= !write.ones(),
             DFSR => {}
-            CPUID | MMFAR | BFAR | AFSR => return None,
+            CPUID | MMFAR | BFAR | AFSR => return Err(Why::NoModel),
             _ => self.registers.write(offset, write)?,
         }
-        Some(())
+        Ok(())
     }
 }
 
@@ -192,25 +193,16 @@ mod tests {
     }
 
     #[test]
-    fn a_fault_without_a_handler_becomes_a_hard_fault() {
-        let (mut control, exceptions) = (Control::new(0), Exceptions::default());
+    fn a_fault_takes_its_handler_or_the_hard_fault_or_locks_up() {
+        let (mut control, mut exceptions) = (Control::new(0), Exceptions::default());
         assert_eq!(control.fault(UNDEFINED, &exceptions, false), Some(HARD_FAULT));
         assert_eq!((control.faults, control.hard), (1 << 16, 1 << 30));
-    }
-
-    #[test]
-    fn a_fault_with_a_handler_takes_it_unless_an_equally_urgent_one_runs() {
-        let (mut control, mut exceptions) = (Control::new(0), Exceptions::default());
         write(&mut control, &mut exceptions, SHCSR, 7 << 16);
         assert_eq!(control.fault(UNDEFINED, &exceptions, false), Some(USAGE_FAULT));
         assert_eq!(control.fault(UNDEFINED, &exceptions, true), Some(HARD_FAULT));
+        // An equally urgent one runs.
         exceptions.enter(INTERRUPT);
         assert_eq!(control.fault(UNDEFINED, &exceptions, false), Some(HARD_FAULT));
-    }
-
-    #[test]
-    fn a_fault_inside_the_hard_fault_locks_up() {
-        let (mut control, mut exceptions) = (Control::new(0), Exceptions::default());
         exceptions.enter(HARD_FAULT);
         assert_eq!(control.fault(UNDEFINED, &exceptions, false), None);
     }
