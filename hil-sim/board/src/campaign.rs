@@ -90,7 +90,7 @@ impl<'a> Board<'a> {
     pub fn new(firmware: Firmware<'a>, scenario: &Scenario) -> Result<Self, BoardError> {
         let mut bench = Bench::new(firmware.elf, firmware.strings, scenario)?;
         store(&mut bench.machine, scenario)?;
-        let record = bench.machine.image().symbol(RECORD)?;
+        let record = bench.machine.image.symbol(RECORD)?;
         Ok(Self {
             bench,
             drives: Drives::default(),

@@ -105,8 +105,10 @@ pub struct Chip {
     /// Faults of the hardware.
     pub defects: Defects,
     locked_up: bool,
-    strays: Strays,
-    reset: Option<Cause>,
+    /// Accesses that no model answered.
+    pub strays: Strays,
+    /// A reset that is due.
+    pub(crate) reset: Option<Cause>,
     deadline: u64,
 }
 
@@ -114,10 +116,7 @@ impl Chip {
     /// The chip as power comes up, with the vectors at `vectors`: emergency stop closed,
     /// button released.
     pub fn new(vectors: u32) -> Self {
-        let ports: [Gpio; 7] = std::array::from_fn(|port| {
-            let outside = pins::OUTSIDE[port];
-            Gpio::new(port, outside.0, outside.1)
-        });
+        let ports = std::array::from_fn(|port| Gpio::new(port, pins::OUTSIDE[port]));
         let mut debug = Registers::all(DBGMCU, &[]);
         debug.set(IDCODE, DEBUG_IDENTITY);
         let mut chip = Self {
@@ -166,9 +165,7 @@ impl Chip {
         // A loss of power clears the flags of earlier resets.
         let earlier = if cause == Cause::Power { 0 } else { old.rcc.flags() };
         self.rcc = Rcc::new(cause, earlier);
-        for (port, (driven, levels)) in old.ports.iter().map(Gpio::outside).enumerate() {
-            self.ports[port] = Gpio::new(port, driven, levels);
-        }
+        self.ports = std::array::from_fn(|port| Gpio::new(port, old.ports[port].outside));
         self.angle = old.angle;
         match cause {
             Cause::Power => self.angle.power_up(),
@@ -191,15 +188,6 @@ impl Chip {
     pub fn supply_falls(&mut self, until: u64, then: Then, now: u64) {
         self.power.fall(until, then);
         self.settle(now);
-    }
-
-    pub fn take_reset(&mut self) -> Option<Cause> {
-        self.reset.take()
-    }
-
-    /// Accesses that no model answered.
-    pub const fn strays(&self) -> &Strays {
-        &self.strays
     }
 
     /// Does what is due at `now`.

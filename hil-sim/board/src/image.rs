@@ -1,7 +1,7 @@
 //! A measurement image on the core: the host calls its functions and counts their cycles.
 
 use super::core::unicorn::{Access, Counted, Memory, UnicornCore};
-use super::core::{CoreError, Meter, Register, Stop};
+use super::core::{CoreError, Meter, NoBus, Register, Stop};
 use super::elf::{FLASH, Loaded, RAM, named};
 use super::error::ImageError;
 use super::spread::Spread;
@@ -39,7 +39,7 @@ impl Image {
     pub fn start(elf: &[u8]) -> Result<Self, ImageError> {
         let loaded = Loaded::of(elf)?;
         let counted = Counted { base: FLASH.base, bytes: &loaded.flash, code: &loaded.code };
-        let mut core = UnicornCore::new(&[FLASH, RAM, SYSTEM, MAILBOX], &counted)?;
+        let mut core = UnicornCore::new(&[FLASH, RAM, SYSTEM, MAILBOX], &counted, NoBus)?;
         core.write(RETURN, &BKPT)?;
         let vector = |at: usize| {
             let bytes: [u8; 4] = loaded.flash[at..at + 4].try_into().unwrap_or_default();

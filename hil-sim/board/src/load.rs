@@ -98,7 +98,7 @@ impl Gathered {
 
     /// Takes the polls of the tick's task since the last call.
     pub fn gather(&mut self, machine: &mut Machine) {
-        let tick = machine.tasks().position(|name| name == TICK);
+        let tick = machine.tasks.names().position(|name| name == TICK);
         let polls = machine.profile.take_polls();
         if self.from.is_some() {
             self.ticks.extend(polls.into_iter().filter(|poll| Some(poll.task) == tick));
@@ -121,7 +121,7 @@ impl Gathered {
             stack: footprint.stack,
             flash: footprint.flash,
             ram: footprint.ram,
-            unmodelled: machine.chip().strays().iter().copied().collect(),
+            unmodelled: machine.chip().strays.iter().copied().collect(),
         }
     }
 }

@@ -91,14 +91,14 @@ pub fn run(
         bench.machine.count_waits()?;
     }
     let (mut log, mut lines_of_log) = (JoinedLog::new(0), Vec::new());
-    bench.start_when_idle();
+    bench.starts = true;
     let started = Instant::now();
     let mut after = AFTER;
     let mut gathered = Gathered::default();
     let mut stream = Vec::new();
     let mut ends_at = longest_s(&scenario.rig);
     while bench.time_s() < ends_at && after > 0 {
-        let waited = bench.waits_to_start();
+        let waited = bench.starts;
         let restarts = bench.machine.restarts().len();
         log.add(bench.plant.truth());
         let t_s = bench.time_s();
@@ -109,7 +109,7 @@ pub fn run(
             let text = format!("{}{level}{}", line.level, line.text);
             lines_of_log.push(LogLine { t_s, text });
         }
-        if waited && !bench.waits_to_start() {
+        if waited && !bench.starts {
             gathered.begin(&mut bench.machine);
         } else {
             gathered.gather(&mut bench.machine);
@@ -141,8 +141,8 @@ pub fn run(
 
 /// Bytes of the stack that were used, deepest since power came up.
 pub fn stack_used(machine: &Machine) -> Result<u32, BoardError> {
-    let end = machine.image().symbol("_stack_end")?;
-    let start = machine.image().symbol("_stack_start")?;
+    let end = machine.image.symbol("_stack_end")?;
+    let start = machine.image.symbol("_stack_start")?;
     let mut stack = vec![0; start.saturating_sub(end.max(RAM.base)) as usize];
     machine.peek(end, &mut stack)?;
     let untouched = stack.iter().take_while(|byte| **byte == super::machine::BLANK).count();

@@ -21,7 +21,7 @@ fn press(board: &mut Board, pressed: bool) {
 }
 
 fn assert_no_strays(board: &Board) {
-    let strays: Vec<_> = board.bench.machine.chip().strays().iter().collect();
+    let strays: Vec<_> = board.bench.machine.chip().strays.iter().collect();
     assert!(strays.is_empty(), "{strays:#?}");
 }
 
@@ -237,9 +237,7 @@ fn a_short_press_starts_and_holding_stops() {
 
 #[test]
 fn an_open_emergency_stop_takes_the_drive_away_until_it_is_reset() {
-    let mut board = Board::idle();
-    board.send(b's');
-    board.until("deploying: cruise", 4000);
+    let mut board = Board::moving();
     board.run(100);
     board.open_stop(true);
     board.until("fault 151", 20);
@@ -254,8 +252,7 @@ fn an_open_emergency_stop_takes_the_drive_away_until_it_is_reset() {
 
 #[test]
 fn power_lost_in_the_middle_of_a_crossing_is_survived() {
-    let mut board = Board::idle();
-    board.send(b's');
+    let mut board = Board::moving();
     board.until("sliding on the corner", 8000);
     board.machine().restart(Cause::Power).expect("restarts");
     assert!(!drives(&mut board, 3000), "nothing moves before a command");
@@ -290,8 +287,7 @@ fn an_interrupt_flag_that_is_not_cleared_is_caught() {
 
 /// A run with a fault that comes when this is logged; what is logged after that.
 fn struck(text: &str, fault: Fault, milliseconds: u32) -> (Board, Vec<String>) {
-    let mut board = Board::idle();
-    board.send(b's');
+    let mut board = Board::moving();
     board.until(text, 8000);
     let from = board.log.len();
     board.strike(fault);
@@ -319,8 +315,7 @@ fn a_broken_sensor_under_way_stops_the_drive_with_a_fault() {
 
 #[test]
 fn bit_errors_that_pass_are_ridden_out() {
-    let mut board = Board::idle();
-    board.send(b's');
+    let mut board = Board::moving();
     board.until("deploying: approach", 8000);
     for _ in 0..5 {
         let fault = Fault::BitErrors(1 << 5);
@@ -338,7 +333,7 @@ fn bit_errors_that_pass_are_ridden_out() {
 #[test]
 fn the_image_contains_no_function_of_a_mathematics_library() {
     let board = Board::off(&[]);
-    let functions = &board.bench.machine.image().functions;
+    let functions = &board.bench.machine.image.functions;
     assert!(functions.len() > 100);
     let of_library = |name: &str| {
         ["libm::", "micromath::", "::float::", "::math::"].iter().any(|part| name.contains(part))

@@ -92,7 +92,7 @@ impl Board {
     }
 
     fn operations(&self) -> u64 {
-        self.board.bench.machine.chip().flash.begun()
+        self.board.bench.machine.chip().flash.begun
     }
 }
 
@@ -106,7 +106,7 @@ fn a_stored_set_is_active_after_a_loss_of_power() {
     board.board.machine().restart(Cause::Power).expect("restarts");
     board.until("mode: idle");
     assert_eq!(board.active(), stored);
-    assert_eq!(board.board.machine().chip().strays().count(), 0);
+    assert_eq!(board.board.machine().chip().strays.count(), 0);
 }
 
 /// The chip breaks the timers by a flag of its own, which a reset of the fault has to clear.

@@ -262,7 +262,7 @@ fn the_first_start_of_an_image_stores_its_checksum() {
 
 /// Bytes of the image: of its vectors, its code, its constants, its hash.
 fn places(board: &Board) -> Vec<u32> {
-    let image = board.bench.machine.image();
+    let image = &board.bench.machine.image;
     let last = image.flash.iter().rposition(|byte| *byte != 0xFF).expect("an image") as u32;
     let hash = image.symbol("__build_id").expect("a symbol");
     vec![0x0800_0000 + 0x1D0, board.function("panic_bounds_check"), 0x0800_0000 + last, hash + 16]
@@ -294,7 +294,7 @@ fn an_inverted_bit_of_the_image_is_reported_and_held() {
 #[test]
 fn an_image_names_no_folder_of_the_machine_that_built_it() {
     let board = Board::idle();
-    let image = &board.bench.machine.image().flash;
+    let image = &board.bench.machine.image.flash;
     let holds = |text: &str| image.windows(text.len()).any(|bytes| bytes == text.as_bytes());
     assert!(holds("src/main.rs"), "places of panics are in it");
     let home = std::env::home_dir().expect("a home");
@@ -362,7 +362,7 @@ fn a_damaged_image_that_cannot_log_blinks() {
 #[test]
 fn the_first_code_of_a_start_uses_no_floating_point() {
     let board = Board::idle();
-    let image = board.bench.machine.image();
+    let image = &board.bench.machine.image;
     let mut checked = 0;
     for name in
         ["__pre_init", "board::image::checksums", "interstage::restart::page::word", "Reset"]

@@ -73,7 +73,7 @@ struct Ticks {
 impl Ticks {
     fn gather(&mut self, board: &mut Board) {
         let machine = &mut board.bench.machine;
-        let tick = machine.tasks().position(|name| name == "motors").expect("the tick");
+        let tick = machine.tasks.names().position(|name| name == "motors").expect("the tick");
         for turn in machine.profile.take_polls().iter().filter(|turn| turn.task == tick) {
             self.cycles.push(turn.cycles);
             self.starts.push(turn.began);
@@ -109,7 +109,7 @@ fn mute(board: &mut Board) {
     let machine = &mut board.bench.machine;
     let keeps = |name: &str| name.ends_with("exchange::Exchange::record");
     let found: Vec<u32> = machine
-        .image()
+        .image
         .functions
         .iter()
         .filter(|function| keeps(&function.name))

@@ -86,7 +86,7 @@ const TASKS: [(&str, &str, u64); 8] = [
 
 /// Runs the board to the next poll of a task, and so many cycles into it.
 fn into_poll(board: &mut Board, task: &str, cycles: u64) {
-    let polls = board.machine().polls().to_vec();
+    let polls = board.machine().tasks.polls().to_vec();
     for poll in polls {
         for _ in 0..60 {
             let machine = board.machine();

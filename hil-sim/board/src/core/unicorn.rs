@@ -125,16 +125,9 @@ fn forget_condition<B: Bus>(uc: &mut Hooked<'_, B>) -> Result<(), uc_error> {
     uc.reg_write(RegisterARM::EPSR, THUMB)
 }
 
-impl UnicornCore {
-    /// A core with these memories and nothing else, counting the cycles of `counted`.
-    pub fn new(memories: &[Memory], counted: &Counted<'_>) -> Result<Self, CoreError> {
-        Self::with_bus(memories, counted, NoBus)
-    }
-}
-
 impl<B: Bus + 'static> UnicornCore<B> {
     /// A core with these memories and a bus, counting the cycles of `counted`.
-    pub fn with_bus(memories: &[Memory], counted: &Counted<'_>, bus: B) -> Result<Self, CoreError> {
+    pub fn new(memories: &[Memory], counted: &Counted<'_>, bus: B) -> Result<Self, CoreError> {
         let ranges = bus.ranges();
         let inside =
             Inside { count: Count::new(counted), bus, marks: Vec::new(), spoilt: Vec::new() };
@@ -312,15 +305,10 @@ impl<B: Bus + 'static> UnicornCore<B> {
     }
 }
 
-/// The engine's name of R0 to R12.
-fn general(number: u8) -> i32 {
-    // The engine numbers R0 to R12 in sequence.
-    RegisterARM::R0 as i32 + i32::from(number)
-}
-
 fn name(register: Register) -> i32 {
     match register {
-        Register::R(number) => general(number),
+        // The engine numbers R0 to R12, and S0 to S31, in sequence.
+        Register::R(number) => RegisterARM::R0 as i32 + i32::from(number),
         Register::Sp => RegisterARM::SP as i32,
         Register::Lr => RegisterARM::LR as i32,
         Register::Pc => RegisterARM::PC as i32,
@@ -330,7 +318,6 @@ fn name(register: Register) -> i32 {
         Register::Primask => RegisterARM::PRIMASK as i32,
         Register::Basepri => RegisterARM::BASEPRI as i32,
         Register::Faultmask => RegisterARM::FAULTMASK as i32,
-        // S0 to S31 too.
         Register::Float(number) => RegisterARM::S0 as i32 + i32::from(number),
         Register::Fpscr => RegisterARM::FPSCR as i32,
     }

@@ -164,8 +164,7 @@ pub fn multiplexer() -> Registers {
     use dmamux::ccr0;
     let request = bits(&[ccr0::DMAREQ_ID, ccr0::EGE, ccr0::NBREQ]);
     let channels = (dmamux::CCR0..=dmamux::CCR15).step_by(4).map(|offset| (offset, request));
-    let flags = [(dmamux::CSR, 0), (dmamux::CFR, 0)];
-    Registers::of(DMAMUX, &[], &channels.chain(flags).collect::<Vec<_>>())
+    Registers::of(DMAMUX, &[], &channels.collect::<Vec<_>>(), &[dmamux::CSR, dmamux::CFR])
 }
 
 /// The request that channel `index` of DMA1 listens to, by the multiplexer; 0 is none.

@@ -6,20 +6,13 @@ use crate::chip::Why;
 use crate::chip::description::{Field, TIM5, bits, tim2::*};
 
 /// Registers that the model has in part: two inputs with their filters, and quadrature modes.
-const PARTS: [(u32, u32); 12] = [
+const PARTS: [(u32, u32); 4] = [
     (CR1, bits(&[cr1::CEN, cr1::UDIS, cr1::URS, cr1::ARPE])),
-    (CR2, 0),
     (SMCR, smcr::SMS.mask),
-    (DIER, 0),
-    (SR, 0),
-    (EGR, 0),
     (CCMR1_INPUT, bits(&[MAPPED[0], FILTER[0], MAPPED[1], FILTER[1]])),
-    (CCMR2_INPUT, 0),
     (CCER, bits(&[ccer::CC1E, ccer::CC2E, INVERTED[0], INVERTED[1]])),
-    (PSC, 0),
-    (CCR1, 0),
-    (CCR2, 0),
 ];
+const FIXED: [u32; 8] = [CR2, DIER, SR, EGR, CCMR2_INPUT, PSC, CCR1, CCR2];
 
 /// Of the two lines: which input the channel looks at, its filter, its polarity.
 const MAPPED: [Field; 2] = [ccmr1_input::CC1S, ccmr1_input::CC2S];
@@ -60,7 +53,7 @@ pub struct Encoder {
 impl Encoder {
     /// After reset, with these levels at its inputs.
     pub fn new(lines: [bool; 2]) -> Self {
-        Self { registers: Registers::of(TIM5, &[CNT, ARR], &PARTS), lines }
+        Self { registers: Registers::of(TIM5, &[CNT, ARR], &PARTS, &FIXED), lines }
     }
 
     /// The lines take these levels for `cycles`; the filter drops shorter ones.

@@ -16,7 +16,7 @@ pub struct Exti {
 impl Exti {
     /// After reset, with these levels at the lines.
     pub fn new(levels: u32) -> Self {
-        Self { registers: Registers::all(EXTI, &[(SWIER2, 0), (PR2, 0)]), levels }
+        Self { registers: Registers::all(EXTI, &[SWIER2, PR2]), levels }
     }
 
     /// Takes the present levels of the lines: 0 to 15 of pins, 16 of the voltage detector.

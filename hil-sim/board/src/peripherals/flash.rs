@@ -93,16 +93,16 @@ pub struct Flash {
     /// An operation has changed what the data cache may hold.
     stale: bool,
     /// Uses of the data cache that corrupt it, resets or not.
-    cache_hazards: u64,
+    pub cache_hazards: u64,
     /// Operations begun so far, resets or not.
-    begun: u64,
+    pub begun: u64,
     cut: Option<Cut>,
     ends: bool,
 }
 
 impl Default for Flash {
     fn default() -> Self {
-        let mut registers = Registers::of(FLASH, &[ACR, SR], &[(CR, CONTROL), (OPTR, 0)]);
+        let mut registers = Registers::of(FLASH, &[ACR, SR], &[(CR, CONTROL)], &[OPTR]);
         // By RM0440, FLASH_ACR; the description has 0.
         registers.put(acr::DBG_SWEN, 1);
         Self {
@@ -202,11 +202,6 @@ impl Flash {
     /// Wait states, see [`super::rcc`].
     pub fn wait_states(&self) -> u32 {
         self.registers.field(acr::LATENCY)
-    }
-
-    /// Uses of the data cache that corrupt its content on the chip.
-    pub const fn cache_hazards(&self) -> u64 {
-        self.cache_hazards
     }
 
     /// Sets the option byte: one bank of 4 KiB pages, or two as delivered.

@@ -27,18 +27,16 @@ pub enum Role {
 #[derive(Clone, Debug)]
 pub struct Gpio {
     registers: Registers,
-    /// What the world outside drives, as pins driven and their levels.
-    driven: u32,
-    levels: u32,
+    /// What the world outside does: pins driven, and their levels.
+    pub outside: (u32, u32),
 }
 
 impl Gpio {
-    /// Port number `port` (0 is A) after reset; `driven` and `levels` say what the world
-    /// outside does with the pins.
-    pub fn new(port: usize, driven: u32, levels: u32) -> Self {
+    /// Port number `port` (0 is A) after reset, with what the world outside does.
+    pub fn new(port: usize, outside: (u32, u32)) -> Self {
         let whole = [MODER, OTYPER, OSPEEDR, PUPDR, ODR, AFRL, AFRH];
-        let registers = Registers::of(PORTS[port], &whole, &[(BSRR, 0), (BRR, 0)]);
-        Self { registers, driven, levels }
+        let registers = Registers::of(PORTS[port], &whole, &[], &[BSRR, BRR]);
+        Self { registers, outside }
     }
 
     pub fn role(&self, pin: u32) -> Role {
@@ -59,8 +57,9 @@ impl Gpio {
         if self.role(pin) == Role::Output {
             return self.registers.get(ODR) >> pin & 1 != 0;
         }
-        if self.driven >> pin & 1 != 0 {
-            return self.levels >> pin & 1 != 0;
+        let (driven, levels) = self.outside;
+        if driven >> pin & 1 != 0 {
+            return levels >> pin & 1 != 0;
         }
         self.registers.get(PUPDR) >> (2 * pin) & 3 == 1
     }
@@ -73,13 +72,9 @@ impl Gpio {
     /// The world outside drives a pin, or lets go of it.
     pub fn drive(&mut self, pin: u32, level: Option<bool>) {
         let bit = 1 << pin;
-        self.driven = if level.is_some() { self.driven | bit } else { self.driven & !bit };
-        self.levels = if level == Some(true) { self.levels | bit } else { self.levels & !bit };
-    }
-
-    /// What the world outside does: pins driven, and their levels.
-    pub const fn outside(&self) -> (u32, u32) {
-        (self.driven, self.levels)
+        let with = |word: u32, on: bool| if on { word | bit } else { word & !bit };
+        let (driven, levels) = self.outside;
+        self.outside = (with(driven, level.is_some()), with(levels, level == Some(true)));
     }
 }
 
@@ -114,7 +109,7 @@ mod tests {
 
     #[test]
     fn an_input_shows_the_world_or_else_its_pull_resistor() {
-        let mut port = Gpio::new(2, 0, 0);
+        let mut port = Gpio::new(2, (0, 0));
         write(&mut port, MODER, 0, 0);
         write(&mut port, PUPDR, 0b01 << 8, 0);
         assert_eq!(port.read(IDR, 0), Some(1 << 4));

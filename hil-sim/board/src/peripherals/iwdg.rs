@@ -1,8 +1,9 @@
 //! The independent watchdog, on its own oscillator of 32 kHz.
 
+use super::registers::Registers;
 use super::{HZ, Peripheral, Write};
 use crate::chip::Why;
-use crate::chip::description::{bits, iwdg::*};
+use crate::chip::description::{IWDG, bits, iwdg::*};
 
 /// Nominal frequency of its oscillator, Hz.
 pub const LSI_HZ: u64 = 32_000;
@@ -38,28 +39,27 @@ impl Time {
 /// Once started it counts down from the reset value; what was written to prescaler and reload
 /// register acts from the first refresh on that follows the update. An update takes periods of
 /// the oscillator, which runs only after the start.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug)]
 pub struct Iwdg {
-    written: Time,
+    registers: Registers,
     acting: Time,
     /// Cycle at which what was written acts.
     updated: u64,
-    window: u32,
     open: bool,
     /// Cycle at which it expires, once started.
     expires: u64,
-    started: bool,
-    /// Frequency of its oscillator, Hz.
-    lsi_hz: u64,
+    pub started: bool,
+    /// Frequency of its oscillator, Hz; to be set before it is started.
+    pub lsi_hz: u64,
 }
 
 impl Default for Iwdg {
     fn default() -> Self {
         Self {
-            written: Time::RESET,
+            // A window that forbids early refreshes is not modelled.
+            registers: Registers::of(IWDG, &[PR, RLR], &[], &[KR, WINR]),
             acting: Time::RESET,
             updated: 0,
-            window: 0xFFF,
             open: false,
             expires: u64::MAX,
             started: false,
@@ -69,11 +69,6 @@ impl Default for Iwdg {
 }
 
 impl Iwdg {
-    /// Sets the frequency of its oscillator, Hz, before it is started.
-    pub const fn set_oscillator(&mut self, lsi_hz: u64) {
-        self.lsi_hz = lsi_hz;
-    }
-
     /// After a reset of the chip: as it came up, with the same oscillator.
     pub fn after_reset(&self) -> Self {
         Self { lsi_hz: self.lsi_hz, ..Self::default() }
@@ -90,11 +85,6 @@ impl Iwdg {
         self.updated = self.updated.saturating_add(cycles);
     }
 
-    /// Whether it counts.
-    pub const fn is_started(&self) -> bool {
-        self.started
-    }
-
     pub const fn has_expired(&self, now: u64) -> bool {
         self.expires <= now
     }
@@ -109,7 +99,7 @@ impl Iwdg {
     /// An update that is over acts.
     fn settle(&mut self, now: u64) {
         if self.started && self.updated <= now {
-            self.acting = self.written;
+            self.acting = self.written();
         }
     }
 
@@ -121,33 +111,28 @@ impl Iwdg {
         }
     }
 
-    fn set(&mut self, written: Time, now: u64) {
-        self.settle(now);
-        self.written = written;
-        self.updated = now + UPDATE * HZ / self.lsi_hz;
+    fn written(&self) -> Time {
+        let field = |field| self.registers.field(field);
+        Time { prescaler: field(pr::PR), reload: field(rlr::RL) }
     }
 
     fn updates(&self, now: u64) -> bool {
-        self.written != self.acting && !(self.started && self.updated <= now)
+        self.written() != self.acting && !(self.started && self.updated <= now)
     }
 }
 
 impl Peripheral for Iwdg {
     fn read(&mut self, offset: u32, now: u64) -> Option<u32> {
         match offset {
-            KR => Some(0),
             SR => Some(if self.updates(now) { UPDATING } else { 0 }),
-            PR => Some(self.written.prescaler),
-            RLR => Some(self.written.reload),
-            WINR => Some(self.window),
-            _ => None,
+            _ => self.registers.read(offset),
         }
     }
 
     fn write(&mut self, offset: u32, write: Write, now: u64) -> Result<(), Why> {
-        let written = self.written;
-        match (offset, kr::KEY.of(write.value)) {
-            (KR, key) => {
+        match offset {
+            KR => {
+                let key = kr::KEY.of(write.value);
                 self.open = key == 0x5555;
                 match key {
                     0xAAAA => self.refresh(now),
@@ -155,16 +140,16 @@ impl Peripheral for Iwdg {
                     _ => {}
                 }
             }
-            (PR, value) if self.open => {
-                self.set(Time { prescaler: pr::PR.of(value), ..written }, now)
+            PR | RLR if self.open => {
+                self.settle(now);
+                self.registers.write(offset, write)?;
+                self.updated = now + UPDATE * HZ / self.lsi_hz;
             }
-            (RLR, value) if self.open => {
-                self.set(Time { reload: rlr::RL.of(value), ..written }, now)
+            PR | RLR => {}
+            WINR => {
+                self.registers.write(offset, write)?;
+                self.refresh(now);
             }
-            // A window that forbids early refreshes is not modelled.
-            (WINR, value) if winr::WIN.of(value) != winr::WIN.mask => return Err(Why::NoModel),
-            (WINR, _) => self.refresh(now),
-            (PR | RLR, _) => {}
             _ => return Err(Why::NoModel),
         }
         Ok(())

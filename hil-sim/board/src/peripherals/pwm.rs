@@ -11,12 +11,8 @@ use crate::chip::description::{TIM1, bits, tim1::*};
 
 /// Registers that the model has in part: counting up and edge-aligned, compares without dithering,
 /// a break input from the pin alone, no lock.
-const PARTS: [(u32, u32); 13] = [
+const PARTS: [(u32, u32); 9] = [
     (CR1, bits(&[cr1::CEN, cr1::UDIS, cr1::URS, cr1::OPM, cr1::ARPE, cr1::CKD])),
-    (CR2, 0),
-    (SMCR, 0),
-    (DIER, 0),
-    (EGR, 0),
     (ARR, 0xFFFF),
     (CCR1, 0xFFFF),
     (CCR2, 0xFFFF),
@@ -59,7 +55,7 @@ impl Pwm {
     /// After reset, with this level at the break input.
     pub fn new(pin: bool) -> Self {
         let whole = [SR, CCMR1_OUTPUT, CCMR2_OUTPUT, CCER, PSC, RCR];
-        let mut registers = Registers::of(TIM1, &whole, &PARTS);
+        let mut registers = Registers::of(TIM1, &whole, &PARTS, &[CR2, SMCR, DIER, EGR]);
         // By RM0440, TIMx_AFx; the description has 0.
         registers.put(af1::BKINE, 1);
         registers.put(af2::BKINE, 1);

@@ -37,7 +37,7 @@ pub struct Pwr {
 
 impl Default for Pwr {
     fn default() -> Self {
-        Self { registers: Registers::of(PWR, &WHOLE, &[]), low: None }
+        Self { registers: Registers::of(PWR, &WHOLE, &[], &[]), low: None }
     }
 }
 

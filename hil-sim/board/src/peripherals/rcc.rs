@@ -33,9 +33,6 @@ const OSCILLATORS: [u64; 2] = [16_000_000, 24_000_000];
 /// Most MHz for 0 to 4 wait states, without and with the boost of range 1. Source: RM0440, 3.3.3.
 const WAIT_STATES: [[u64; 5]; 2] = [[30, 60, 90, 120, 150], [34, 68, 102, 136, 170]];
 
-/// The flags of ready clocks request no interrupt.
-const PARTS: [(u32, u32); 3] = [(CIFR, 0), (CICR, 0), (CSR, csr::LSION.mask)];
-
 /// Why the chip started, as flags of `CSR`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cause {
@@ -75,7 +72,8 @@ pub struct Rcc {
 impl Rcc {
     /// After a reset; `earlier` are the flags that were not cleared.
     pub fn new(cause: Cause, earlier: u32) -> Self {
-        let mut registers = Registers::all(RCC, &PARTS);
+        // The flags of ready clocks request no interrupt.
+        let mut registers = Registers::all(RCC, &[CIFR, CICR]);
         // By RM0440, RCC_CR; the description has bits that are no fields.
         registers.set(CR, cr::HSION.mask);
         registers.set(CFGR, cfgr::SW.at(1));

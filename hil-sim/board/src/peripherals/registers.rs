@@ -9,12 +9,14 @@ use crate::chip::description::{Field, Peripheral};
 pub struct Registers(Vec<Option<(u32, u32)>>);
 
 impl Registers {
-    /// After reset, as described: the registers of a peripheral at the offsets `whole`, and those of
-    /// `parts`, of which the model has the bits given and refuses a change of the others.
-    pub fn of(peripheral: Peripheral, whole: &[u32], parts: &[(u32, u32)]) -> Self {
-        let whole = whole.iter().map(|offset| (*offset, u32::MAX));
+    /// After reset, as described: the registers of a peripheral at the offsets `whole`, those of
+    /// `parts`, of which the model has the bits given, and those at `fixed`, of which it has none.
+    /// A change of other bits is refused.
+    pub fn of(peripheral: Peripheral, whole: &[u32], parts: &[(u32, u32)], fixed: &[u32]) -> Self {
+        let (whole, fixed) =
+            (whole.iter().map(|at| (*at, u32::MAX)), fixed.iter().map(|at| (*at, 0)));
         let mut registers = Self::default();
-        for (offset, bits) in whole.chain(parts.iter().copied()) {
+        for (offset, bits) in whole.chain(parts.iter().copied()).chain(fixed) {
             for register in peripheral.registers.iter().filter(|known| known.offset == offset) {
                 // Two layouts share their bits.
                 let (reset, mask) = registers.word(offset).unwrap_or((register.reset, 0));
@@ -24,11 +26,11 @@ impl Registers {
         registers
     }
 
-    /// The same of all registers.
-    pub fn all(peripheral: Peripheral, parts: &[(u32, u32)]) -> Self {
+    /// The same of all registers, whole but for the `fixed` ones.
+    pub fn all(peripheral: Peripheral, fixed: &[u32]) -> Self {
         let whole = peripheral.registers.iter().map(|register| register.offset);
-        let is_part = |offset: &u32| parts.iter().any(|(part, _)| part == offset);
-        Self::of(peripheral, &whole.filter(|at| !is_part(at)).collect::<Vec<_>>(), parts)
+        let whole: Vec<u32> = whole.filter(|offset| !fixed.contains(offset)).collect();
+        Self::of(peripheral, &whole, &[], fixed)
     }
 
     /// Adds a register of this value, of which a program can change the bits of a mask.
@@ -109,7 +111,7 @@ mod tests {
     #[test]
     fn a_write_of_bits_that_are_not_kept_is_refused_and_other_registers_are_absent() {
         let plain = bits(&[cr1::CEN, cr1::ARPE]);
-        let mut registers = Registers::of(TIM1, &[CCMR1_OUTPUT], &[(CR1, plain), (CR2, 0)]);
+        let mut registers = Registers::of(TIM1, &[CCMR1_OUTPUT], &[(CR1, plain)], &[CR2]);
         for (offset, value, mask, expected) in [
             (CR1, u32::MAX, 0xFF7F, None),
             (CR1, 0x81, 0xF1, Some(0x81)),

@@ -10,10 +10,9 @@ mod angle;
 pub use angle::AngleSensor;
 
 /// Registers that the model has in part: a master with two lines and no checksum, without DMA.
-const PARTS: [(u32, u32); 3] = [
+const PARTS: [(u32, u32); 2] = [
     (CR1, bits(&[cr1::CPHA, cr1::CPOL, cr1::MSTR, cr1::BR, cr1::SPE]) | SELECTS),
     (CR2, !bits(&[cr2::RXDMAEN, cr2::TXDMAEN])),
-    (I2SCFGR, 0),
 ];
 const SELECTS: u32 = bits(&[cr1::LSBFIRST, cr1::SSI, cr1::SSM]);
 
@@ -45,7 +44,7 @@ pub struct Spi {
 impl Default for Spi {
     fn default() -> Self {
         Self {
-            registers: Registers::of(SPI1, &[CRCPR], &PARTS),
+            registers: Registers::of(SPI1, &[CRCPR], &PARTS, &[I2SCFGR]),
             next: None,
             shifting: None,
             taken: None,

@@ -14,7 +14,7 @@ impl Default for Syscfg {
     fn default() -> Self {
         let whole = [MEMRMP, CFGR1, EXTICR1, EXTICR2, EXTICR3, EXTICR4];
         let breaks = bits(&[cfgr2::CLL, cfgr2::SPL, cfgr2::ECCL]);
-        Self(Registers::of(SYSCFG, &whole, &[(CFGR2, breaks)]))
+        Self(Registers::of(SYSCFG, &whole, &[(CFGR2, breaks)], &[]))
     }
 }
 

@@ -39,6 +39,11 @@ impl System {
         }
     }
 
+    /// Notes a fault, see [`Control::fault`].
+    pub fn fault(&mut self, cause: Cause, masked: bool) -> Option<u8> {
+        self.control.fault(cause, &self.exceptions, masked)
+    }
+
     /// Priorities of four exceptions from `first` on, as a word.
     fn priorities(&self, first: u32) -> u32 {
         (0..4).fold(0, |word, byte| {

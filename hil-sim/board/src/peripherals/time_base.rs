@@ -37,15 +37,8 @@ impl Default for TimeBase {
             registers: Registers::of(
                 TIM2,
                 &[SR, PSC, ARR, CCR1, CCR2, CCR3, CCR4],
-                &[
-                    (CR1, PLAIN),
-                    (CR2, 0),
-                    (SMCR, 0),
-                    (DIER, INTERRUPTS),
-                    (EGR, 0),
-                    (CCMR1_OUTPUT, 0),
-                    (CCMR2_OUTPUT, 0),
-                ],
+                &[(CR1, PLAIN), (DIER, INTERRUPTS)],
+                &[CR2, SMCR, EGR, CCMR1_OUTPUT, CCMR2_OUTPUT],
             ),
             flags: 5,
             origin: 0,
@@ -60,8 +53,9 @@ impl Default for TimeBase {
 impl TimeBase {
     /// Without compare registers.
     pub fn basic() -> Self {
-        let parts = [(CR1, PLAIN), (CR2, 0), (DIER, dier::UIE.mask), (EGR, 0), (ARR, 0xFFFF)];
-        Self { registers: Registers::of(TIM7, &[SR, PSC], &parts), flags: 1, ..Self::default() }
+        let parts = [(CR1, PLAIN), (DIER, dier::UIE.mask), (ARR, 0xFFFF)];
+        let registers = Registers::of(TIM7, &[SR, PSC], &parts, &[CR2, EGR]);
+        Self { registers, flags: 1, ..Self::default() }
     }
 
     fn runs(&self) -> bool {

@@ -146,12 +146,12 @@ impl Board {
     }
 
     pub(crate) fn strike(&mut self, fault: Fault) {
-        fault.strike(self.machine()).expect("strikes");
+        fault.switch(self.machine(), true).expect("strikes");
     }
 
     /// Address of the first function whose name contains this.
     pub(crate) fn function(&self, name: &str) -> u32 {
-        let functions = &self.bench.machine.image().functions;
+        let functions = &self.bench.machine.image.functions;
         let found = functions.iter().find(|function| function.name.contains(name));
         found.unwrap_or_else(|| panic!("no function {name}")).range.start
     }

@@ -17,7 +17,7 @@ fn core(code: &[u16]) -> UnicornCore {
         Memory { base: RAM, size: 0x1000, access: Access::Data },
     ];
     let counted = Counted { base: FLASH, bytes: &bytes, code: std::slice::from_ref(&range) };
-    let mut core = UnicornCore::new(&memories, &counted).expect("a core");
+    let mut core = UnicornCore::new(&memories, &counted, NoBus).expect("a core");
     core.set_register(Register::R(0), RAM).expect("set");
     core.set_register(Register::Sp, RAM + 0x1000).expect("set");
     core

@@ -43,7 +43,7 @@ pub(super) struct Converter {
 impl Converter {
     pub(super) fn new() -> Self {
         Self {
-            registers: Registers::of(ADC1, &WHOLE, &[(AWD2CR, 0), (AWD3CR, 0)]),
+            registers: Registers::of(ADC1, &WHOLE, &[], &[AWD2CR, AWD3CR]),
             done: u64::MAX,
             injected: None,
             regulated: u64::MAX,

@@ -204,7 +204,7 @@ fn the_data_cache_is_off_during_an_operation_and_reset_after_it() {
         write(&mut flash, CR, PROGRAM, 0);
         program(&mut flash, PLACE, 1, ERASED).expect("programmed");
         after.iter().for_each(|value| access(&mut flash, *value));
-        flash.cache_hazards()
+        flash.cache_hazards
     };
     assert_eq!(hazards(&[], &[]), 1, "it is on after reset");
     assert_eq!(hazards(&[0], &[CACHED]), 1, "its content is old");
