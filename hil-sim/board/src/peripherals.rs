@@ -5,10 +5,9 @@
 //! its own is due. What leads from one to another (interrupt lines, DMA requests, pins)
 //! is [`super::chip`]'s.
 //!
-//! To add one: implement [`Peripheral`] in a file here (`read` and `write` by offset, `None` for a
-//! register that does not exist; `deadline` and `advance` if something happens by itself; registers
-//! that only keep what is written go into [`registers::Registers`], by the names of
-//! `chip/description.rs`). Add a field in `Chip`, a line in `chip/map.rs`; its interrupt line,
+//! To add one: implement [`Peripheral`] in a file here (`read` and `write` by offset; `deadline` and
+//! `advance` if something happens by itself; registers that only keep what is written go into
+//! [`registers::Registers`], by the names of `chip/description.rs`). Add a field in `Chip`, a line in `chip/map.rs`; its interrupt line,
 //! deadline and DMA requests in `Chip::settle_lines`; its pins in `chip/pins.rs`. Test it against the
 //! register description; in a run `unmodelled` must stay empty.
 

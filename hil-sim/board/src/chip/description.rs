@@ -7,8 +7,8 @@
 //! The models stay independent of what the firmware expects: a description has positions and
 //! no behaviour, which is written in [`crate::peripherals`] from the reference manual. Nor is it the
 //! firmware's own, whose registers come from `stm32-metapac`, a table kept by hand since it was
-//! taken from ST's SVD: what one of the two has wrong shows as an access to a reserved bit or
-//! to a register that no model has.
+//! taken from such an SVD. With the types of that crate an error in it would be the model's too;
+//! so it shows as an access to a reserved bit, to a register that no model has, or as a failed run.
 
 include!(concat!(env!("OUT_DIR"), "/description.rs"));
 

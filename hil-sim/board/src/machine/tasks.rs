@@ -55,7 +55,7 @@ impl Tasks {
         &self.polls
     }
 
-    /// Names, by the numbers that [`Tasks::begins`] gives.
+    /// Names, by the numbers in the profile.
     pub fn names(&self) -> impl Iterator<Item = &str> {
         self.pools.iter().map(|(_, name)| name.as_str())
     }

@@ -203,5 +203,12 @@ mod tests {
         assert_eq!(dma.read(ISR, 0), Some(bits(&[isr::GIF3, isr::TCIF3, isr::HTIF3])));
         write(&mut dma, IFCR, ifcr::CGIF3.mask, 0);
         assert!(!dma.requests(2));
+        // A wrong address ends it.
+        let mut dma = ready();
+        dma.moved(2, false);
+        assert_eq!(
+            (dma.due(2), dma.read(CH3_CR, 0).map(|word| ch3_cr::EN.of(word))),
+            (None, Some(0))
+        );
     }
 }

@@ -234,13 +234,4 @@ mod tests {
         write(&mut timer, DIER, dier::CC1IE.mask, 1000);
         assert_eq!(timer.deadline(), u64::MAX);
     }
-
-    #[test]
-    fn counting_down_is_not_modelled() {
-        let mut timer = TimeBase::default();
-        assert_eq!(
-            timer.write(CR1, Write { value: cr1::DIR.mask, mask: u32::MAX }, 0),
-            Err(Why::NoModel)
-        );
-    }
 }

@@ -59,7 +59,7 @@ impl Ecc {
             return;
         }
         let offset = address - BASE;
-        let place = eccr::BK_ECC.at(offset / BANK_BYTES) | offset % BANK_BYTES / WORD;
+        let place = eccr::BK_ECC.at(offset / BANK_BYTES) | (offset % BANK_BYTES / WORD);
         let flag = if corrected { eccr::ECCC } else { eccr::ECCD };
         self.register &= bits(&[eccr::ECCIE, eccr::ECCC]);
         self.register |= flag.mask | place;
