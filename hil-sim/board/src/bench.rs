@@ -61,8 +61,8 @@ pub struct Bench<'a> {
     pub wiring: Wiring,
     /// The letter that starts the drive.
     start: u8,
-    /// The drive starts when it is idle.
-    starts: bool,
+    /// The command to start is still to be sent, as soon as the drive is idle.
+    pub starts: bool,
     /// The log has reported idle.
     idle: bool,
 }
@@ -223,16 +223,6 @@ impl<'a> Bench<'a> {
             preload_on: on(preload),
             ..Drives::default()
         }
-    }
-
-    /// Sends the command to start as soon as the drive is idle.
-    pub fn start_when_idle(&mut self) {
-        self.starts = true;
-    }
-
-    /// Whether that command is still to be sent.
-    pub const fn waits_to_start(&self) -> bool {
-        self.starts
     }
 
     /// Applies the wiring to the chip's pins.

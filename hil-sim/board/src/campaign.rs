@@ -23,9 +23,7 @@ use crate::log::Strings;
 use crate::peripherals::rcc::Cause;
 use crate::run::store;
 use hil_sim::faults::campaign::operator::Operator;
-use hil_sim::faults::campaign::{
-    AFTER_S, FaultCampaign, Instant, Outcome, Twin, crossed, doing, longest_s,
-};
+use hil_sim::faults::campaign::{AFTER_S, Instant, Twin, crossed, doing, longest_s};
 use hil_sim::faults::judge::{Finding, Judge};
 use hil_sim::faults::sets;
 use hil_sim::injector::FaultTimes;
@@ -57,18 +55,6 @@ pub struct Firmware<'a> {
     /// The image.
     pub elf: &'a [u8],
     pub strings: &'a Strings,
-}
-
-/// Runs a campaign on the emulated board, as [`FaultCampaign::run`] does in software.
-pub fn run(
-    campaign: &FaultCampaign,
-    firmware: Firmware<'_>,
-    done: &(dyn Fn() + Sync),
-) -> Result<Outcome, BoardError> {
-    let twin = |scenario: &Scenario| twin(firmware, scenario);
-    let watched = |scenario: &Scenario, twin: &Twin| watched(firmware, scenario, twin);
-    let rigs = campaign.rigs(twin, done)?;
-    campaign.on("board", &rigs, watched).complete(done)
 }
 
 /// A running board, seen from outside.
@@ -104,7 +90,7 @@ impl<'a> Board<'a> {
     pub fn new(firmware: Firmware<'a>, scenario: &Scenario) -> Result<Self, BoardError> {
         let mut bench = Bench::new(firmware.elf, firmware.strings, scenario)?;
         store(&mut bench.machine, scenario)?;
-        let record = bench.machine.image().symbol(RECORD)?;
+        let record = bench.machine.image.symbol(RECORD)?;
         Ok(Self {
             bench,
             drives: Drives::default(),

@@ -8,18 +8,18 @@ mod pins;
 mod stray;
 
 use super::peripherals::Peripheral;
-use super::peripherals::adc::{self, Adc};
-use super::peripherals::dma::{CHANNELS, Dma, Dmamux, Move};
+use super::peripherals::adc::Adc;
+use super::peripherals::dma::{self, CHANNELS, Dma, Move};
 use super::peripherals::encoder::Encoder;
 use super::peripherals::exti::Exti;
 use super::peripherals::flash::{Change, Flash};
 use super::peripherals::gpio::Gpio;
 use super::peripherals::iwdg::Iwdg;
 use super::peripherals::pwm::Pwm;
-use super::peripherals::pwr::{self, Pwr, Then};
-use super::peripherals::rcc::{self, Cause, Rcc};
-use super::peripherals::registers::{Kept, Registers};
-use super::peripherals::spi::{self, AngleSensor, Spi};
+use super::peripherals::pwr::{Pwr, Then};
+use super::peripherals::rcc::{Cause, Rcc};
+use super::peripherals::registers::Registers;
+use super::peripherals::spi::{AngleSensor, Spi};
 use super::peripherals::syscfg::Syscfg;
 use super::peripherals::system::{Counter, System};
 use super::peripherals::time_base::TimeBase;
@@ -27,13 +27,15 @@ use super::peripherals::time_base::TimeBase;
 pub use pins::{Bridge, Motor, Pin};
 pub use stray::{Stray, Strays, Why};
 
-use map::Block;
+use description::{ADC1, DBGMCU, EXTI, FLASH, GPIOA, GPIOG, PWR, SPI1, SYSCFG, TIM1, TIM8};
+use description::{adc1, dbgmcu::*, spi1};
+use map::Place;
 
 /// External interrupt line of the voltage detector.
 const SUPPLY_LINE: u32 = 16;
 
 /// `DBGMCU_IDCODE`: category 3, revision X.
-const DEBUG_IDENTITY: Kept = Kept { offset: 0, reset: 0x2003_6469, mask: 0 };
+const DEBUG_IDENTITY: u32 = 0x2003_6469;
 
 /// Requests of the multiplexer: ADC1 and ADC2.
 const REQUESTS: [u32; 2] = [5, 36];
@@ -86,8 +88,9 @@ pub struct Chip {
     /// ADC3 and ADC4; ADC3 reads the bridges.
     readback: Adc,
     dma: Dma,
-    mux: Dmamux,
-    spi: Spi,
+    mux: Registers,
+    /// The angle sensor's bus.
+    pub spi: Spi,
     /// Independent watchdog.
     pub watchdog: Iwdg,
     /// Debug support: its freeze bits act while a debugger halts the core.
@@ -102,8 +105,10 @@ pub struct Chip {
     /// Faults of the hardware.
     pub defects: Defects,
     locked_up: bool,
-    strays: Strays,
-    reset: Option<Cause>,
+    /// Accesses that no model answered.
+    pub strays: Strays,
+    /// A reset that is due.
+    pub(crate) reset: Option<Cause>,
     deadline: u64,
 }
 
@@ -111,10 +116,9 @@ impl Chip {
     /// The chip as power comes up, with the vectors at `vectors`: emergency stop closed,
     /// button released.
     pub fn new(vectors: u32) -> Self {
-        let ports: [Gpio; 7] = std::array::from_fn(|port| {
-            let outside = pins::OUTSIDE[port];
-            Gpio::new(port, outside.0, outside.1)
-        });
+        let ports = std::array::from_fn(|port| Gpio::new(port, pins::OUTSIDE[port]));
+        let mut debug = Registers::all(DBGMCU, &[]);
+        debug.set(IDCODE, DEBUG_IDENTITY);
         let mut chip = Self {
             system: System::new(vectors),
             counter: Counter::default(),
@@ -131,10 +135,10 @@ impl Chip {
             adc: Adc::default(),
             readback: Adc::default(),
             dma: Dma::default(),
-            mux: Dmamux::default(),
+            mux: dma::multiplexer(),
             spi: Spi::default(),
             watchdog: Iwdg::default(),
-            debug: Registers::new(&[DEBUG_IDENTITY], &[0x04, 0x08, 0x0C, 0x10], &[]),
+            debug,
             angle: AngleSensor::default(),
             deselected: false,
             wheel: 0,
@@ -161,9 +165,7 @@ impl Chip {
         // A loss of power clears the flags of earlier resets.
         let earlier = if cause == Cause::Power { 0 } else { old.rcc.flags() };
         self.rcc = Rcc::new(cause, earlier);
-        for (port, (driven, levels)) in old.ports.iter().map(Gpio::outside).enumerate() {
-            self.ports[port] = Gpio::new(port, driven, levels);
-        }
+        self.ports = std::array::from_fn(|port| Gpio::new(port, old.ports[port].outside));
         self.angle = old.angle;
         match cause {
             Cause::Power => self.angle.power_up(),
@@ -182,24 +184,10 @@ impl Chip {
         torn
     }
 
-    /// Whether a frame is on the angle sensor's bus.
-    pub const fn angle_bus_is_busy(&self) -> bool {
-        self.spi.is_busy()
-    }
-
     /// The supply is below the detector's threshold until this cycle.
     pub fn supply_falls(&mut self, until: u64, then: Then, now: u64) {
         self.power.fall(until, then);
         self.settle(now);
-    }
-
-    pub fn take_reset(&mut self) -> Option<Cause> {
-        self.reset.take()
-    }
-
-    /// Accesses that no model answered.
-    pub const fn strays(&self) -> &Strays {
-        &self.strays
     }
 
     /// Does what is due at `now`.
@@ -242,20 +230,20 @@ impl Chip {
     /// A debugger halts the core for so many cycles from `now` on: what the freeze bits name
     /// stands still with it. Source: RM0440, `DBGMCU_APB1FZR1` and `DBGMCU_APB2FZR`.
     pub(crate) fn halt(&mut self, cycles: u64, now: u64) {
-        let frozen = [self.debug.get(0x08), self.debug.get(0x10)];
         self.system.tick.freeze(cycles);
         self.counter.freeze(cycles);
-        if frozen[0] & 1 != 0 {
+        if self.debug.has(apb1l_fz::DBG_TIMER2_STOP) {
             self.time.freeze(cycles, now);
         }
-        if frozen[0] & 1 << 5 != 0 {
+        if self.debug.has(apb1l_fz::DBG_TIM7_STOP) {
             self.basic.freeze(cycles, now);
         }
-        if frozen[0] & 1 << 12 != 0 {
+        if self.debug.has(apb1l_fz::DBG_IWDG_STOP) {
             self.watchdog.freeze(cycles);
         }
-        for (motor, bit) in self.motors.iter_mut().zip([11, 13]) {
-            if frozen[1] >> bit & 1 != 0 {
+        let stops = [apb2_fz::DBG_TIM1_STOP, apb2_fz::DBG_TIM8_STOP];
+        for (motor, stop) in self.motors.iter_mut().zip(stops) {
+            if self.debug.has(stop) {
                 motor.freeze(true, cycles, now);
             }
         }
@@ -286,7 +274,7 @@ impl Chip {
             return None;
         }
         (0..CHANNELS).find_map(|channel| {
-            let request = self.mux.request(channel);
+            let request = dma::request(&self.mux, channel);
             let source = REQUESTS.iter().position(|known| *known == request)?;
             if requested[source] { self.dma.due(channel) } else { None }
         })
@@ -304,32 +292,22 @@ impl Chip {
         self.settle_lines(now);
     }
 
-    /// The same after an access to one block, for the lines that it can change.
-    fn settle_after(&mut self, block: Block, offset: u32, write: bool, now: u64) {
+    /// The same after an access to a register, for the lines that it can change.
+    fn settle_after(&mut self, Place { block, offset }: Place, write: bool, now: u64) {
         // Reading a data register changes state.
-        let by_reading = match block {
-            Block::Adc => offset & 0xFF == adc::DR,
-            Block::Spi => offset == spi::DR,
-            _ => false,
-        };
-        match block {
-            Block::Port(_)
-            | Block::Syscfg
-            | Block::Motor(_)
-            | Block::Exti
-            | Block::Pwr
-            | Block::Flash
-                if write =>
-            {
-                if matches!(block, Block::Port(_)) {
-                    self.look_at_wheel();
-                }
-                self.settle(now);
+        let by_reading =
+            block.is(ADC1) && offset % 0x100 == adc1::DR || block.is(SPI1) && offset == spi1::DR;
+        let is_port = (GPIOA.address..=GPIOG.address).contains(&block.base);
+        let pins = [SYSCFG, TIM1, TIM8, EXTI, PWR, FLASH];
+        if write && (is_port || pins.into_iter().any(|of| block.is(of))) {
+            if is_port {
+                self.look_at_wheel();
             }
+            self.settle(now);
+        } else if block.base == map::CORE && (0x100..0x500).contains(&offset) {
             // The interrupt controller updates itself.
-            Block::System if (0x100..0x500).contains(&offset) => {}
-            _ if write || by_reading => self.settle_lines(now),
-            _ => {}
+        } else if write || by_reading {
+            self.settle_lines(now);
         }
     }
 
@@ -374,31 +352,6 @@ impl Chip {
         self.deadline = due.into_iter().min().unwrap_or(u64::MAX);
         if self.reset.is_some() || self.next_move().is_some() {
             self.deadline = now;
-        }
-    }
-
-    /// The registers of a block.
-    fn block(&mut self, block: Block) -> &mut dyn Peripheral {
-        match block {
-            Block::Time => &mut self.time,
-            Block::Basic => &mut self.basic,
-            Block::Encoder => &mut self.encoder,
-            Block::Motor(index) => &mut self.motors[index],
-            Block::Watchdog => &mut self.watchdog,
-            Block::Pwr => &mut self.power,
-            Block::Syscfg => &mut self.syscfg,
-            Block::Exti => &mut self.exti,
-            Block::Spi => &mut self.spi,
-            Block::Dma => &mut self.dma,
-            Block::Mux => &mut self.mux,
-            Block::Rcc => &mut self.rcc,
-            Block::Flash => &mut self.flash,
-            Block::Port(index) => &mut self.ports[index],
-            Block::Adc => &mut self.adc,
-            Block::Readback => &mut self.readback,
-            Block::Counter => &mut self.counter,
-            Block::System => &mut self.system,
-            Block::Debug => &mut self.debug,
         }
     }
 }

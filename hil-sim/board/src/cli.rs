@@ -6,7 +6,7 @@ use std::fs;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{Parser, Subcommand, ValueEnum};
 use hil_sim::bringup::Operation;
 use hil_sim::cli::failure::{Failure, Outcome};
 use hil_sim::cli::{bringup, capture, faults, live, operate, output, params};
@@ -102,8 +102,11 @@ fn image(scenario: &Scenario) -> Result<(Vec<u8>, Strings), Failure> {
 /// The first power-up of the emulated board, with the mistakes in its wiring that are asked for.
 fn bring_up(args: &bringup::Args) -> Result<Outcome, Failure> {
     let mistake = |name: &String| {
-        let parsed: Result<Mistake, String> = name.parse();
-        parsed.map_err(|error| Failure::input(format!("--mistake {name}: {error}")))
+        Mistake::from_str(name, false).map_err(|_| {
+            let all = Mistake::value_variants().iter().filter_map(Mistake::to_possible_value);
+            let names: Vec<_> = all.map(|value| value.get_name().to_owned()).collect();
+            Failure::input(format!("--mistake {name}: expected one of {}", names.join(", ")))
+        })
     };
     let mistakes: Vec<Mistake> = args.mistake.iter().map(mistake).collect::<Result<_, _>>()?;
     let given = args.scenario()?;
@@ -195,7 +198,7 @@ fn cycles(args: &CyclesArgs) -> Result<Outcome, Failure> {
         let tick = cycles::tick(&mut image, &Scenario::default()).map_err(Failure::run)?;
         let elf = firmware::image(Profile::Release)?;
         let options = RunOptions { wait_states: true, ..RunOptions::default() };
-        let ran = run::run_with(&elf, &Scenario::default(), &options, |_, _| {});
+        let ran = run::run(&elf, &Scenario::default(), &options, |_, _| {});
         let firmware = ran.map_err(Failure::run)?.load.tick;
         output::result(true, &Measured { tick, firmware }, none)?;
     }

@@ -149,12 +149,11 @@ pub fn replay(
     ticks: &[Recorded],
     skips: bool,
 ) -> Result<Vec<TickCost>, CyclesError> {
-    let function = |image: &Image, name: &str| image.function(name);
-    let (load, step) = (function(image, "tick_load")?, function(image, "tick_step")?);
-    let (plan, save) = (function(image, "tick_plan")?, function(image, "tick_save")?);
-    image.call(function(image, "tick_build")?, &[preset as u32])?;
+    let (load, step) = (image.function("tick_load")?, image.function("tick_step")?);
+    let (plan, save) = (image.function("tick_plan")?, image.function("tick_save")?);
+    image.call(image.function("tick_build")?, &[preset as u32])?;
     if !skips {
-        image.call(function(image, "tick_skip_nothing")?, &[])?;
+        image.call(image.function("tick_skip_nothing")?, &[])?;
     }
     let mut costs = Vec::with_capacity(ticks.len());
     for (number, tick) in ticks.iter().enumerate() {

@@ -115,7 +115,7 @@ impl BoardInjector {
             self.save = set.map(|set| Save::new(machine, set, cut(injection)));
         }
         if let Some(bit) = flipped(machine, injection)?.filter(|_| on) {
-            return bit.strike(machine);
+            return bit.switch(machine, true);
         }
         match register(injection) {
             Some(fault) if on && (injection.resets_board() || injection.kind == Kind::Halted) => {
@@ -144,7 +144,7 @@ impl BoardInjector {
         if let Some((fault, part)) = self.within.take() {
             let now = machine.now();
             machine.run_on(now + (part * until.saturating_sub(now) as f64) as u64)?;
-            fault.strike(machine)?;
+            fault.switch(machine, true)?;
         }
         if let Some(search) = &mut self.search
             && search.run(machine, until)?
@@ -263,7 +263,7 @@ fn flipped(machine: &Machine, injection: &Injection) -> Result<Option<Fault>, Co
             (machine.find(&set)?, bit % (8 * set.len() as u32).max(1))
         }
         Target::Image => {
-            let used = machine.image().flash.iter().rposition(|byte| *byte != 0xFF);
+            let used = machine.image.flash.iter().rposition(|byte| *byte != 0xFF);
             (Some(FLASH.base), bit % (8 * used.map_or(1, |last| last as u32 + 1)))
         }
         _ => return Ok(None),
@@ -314,7 +314,7 @@ struct TaskSearch {
 
 impl TaskSearch {
     fn new(machine: &Machine, task: &'static str) -> Self {
-        Self { task, places: machine.polls().to_vec(), tried: 0 }
+        Self { task, places: machine.tasks.polls().to_vec(), tried: 0 }
     }
 
     /// Runs to this cycle at most; returns whether the task hangs.

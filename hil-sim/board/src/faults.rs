@@ -58,11 +58,6 @@ pub enum Fault {
 }
 
 impl Fault {
-    /// Switches the fault on.
-    pub fn strike(self, machine: &mut Machine) -> Result<(), CoreError> {
-        self.switch(machine, true)
-    }
-
     /// Switches the fault on or off. A single event (a reset, a hang, a flipped bit) is not
     /// undone.
     pub fn switch(self, machine: &mut Machine, on: bool) -> Result<(), CoreError> {

@@ -1,7 +1,7 @@
 //! A measurement image on the core: the host calls its functions and counts their cycles.
 
 use super::core::unicorn::{Access, Counted, Memory, UnicornCore};
-use super::core::{CoreError, Meter, Register, Stop};
+use super::core::{CoreError, Meter, NoBus, Register, Stop};
 use super::elf::{FLASH, Loaded, RAM, named};
 use super::error::ImageError;
 use super::spread::Spread;
@@ -39,7 +39,7 @@ impl Image {
     pub fn start(elf: &[u8]) -> Result<Self, ImageError> {
         let loaded = Loaded::of(elf)?;
         let counted = Counted { base: FLASH.base, bytes: &loaded.flash, code: &loaded.code };
-        let mut core = UnicornCore::new(&[FLASH, RAM, SYSTEM, MAILBOX], &counted)?;
+        let mut core = UnicornCore::new(&[FLASH, RAM, SYSTEM, MAILBOX], &counted, NoBus)?;
         core.write(RETURN, &BKPT)?;
         let vector = |at: usize| {
             let bytes: [u8; 4] = loaded.flash[at..at + 4].try_into().unwrap_or_default();
@@ -62,13 +62,9 @@ impl Image {
 
     /// Reads words from the mailbox.
     pub fn get<const N: usize>(&self, address: u32) -> Result<[u32; N], ImageError> {
-        let mut words = [0; N];
-        for (index, word) in words.iter_mut().enumerate() {
-            let mut bytes = [0; 4];
-            self.core.read(address + 4 * index as u32, &mut bytes)?;
-            *word = u32::from_le_bytes(bytes);
-        }
-        Ok(words)
+        let mut bytes = vec![[0; 4]; N];
+        self.core.read(address, bytes.as_flattened_mut())?;
+        Ok(std::array::from_fn(|index| u32::from_le_bytes(bytes[index])))
     }
 
     /// Address of a function, for [`Image::call`].

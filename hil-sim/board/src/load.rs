@@ -55,7 +55,7 @@ pub struct WithWaits {
     pub worst: u64,
 }
 
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Load {
     pub clock_hz: u64,
     /// Cycles counted.
@@ -89,17 +89,17 @@ pub struct Gathered {
 impl Gathered {
     /// Counting begins.
     pub fn begin(&mut self, machine: &mut Machine) {
-        machine.profile_mut().take_polls();
+        machine.profile.take_polls();
         *self = Self {
-            from: Some((machine.now(), machine.slept(), machine.waits())),
+            from: Some((machine.now(), machine.profile.slept(), machine.waits())),
             ..Self::default()
         };
     }
 
     /// Takes the polls of the tick's task since the last call.
     pub fn gather(&mut self, machine: &mut Machine) {
-        let tick = machine.tasks().position(|name| name == TICK);
-        let polls = machine.profile_mut().take_polls();
+        let tick = machine.tasks.names().position(|name| name == TICK);
+        let polls = machine.profile.take_polls();
         if self.from.is_some() {
             self.ticks.extend(polls.into_iter().filter(|poll| Some(poll.task) == tick));
         }
@@ -109,7 +109,7 @@ impl Gathered {
     pub fn close(self, machine: &Machine, footprint: &Footprint, stack_used: u32) -> Load {
         let (from, slept, waits) = self.from.unwrap_or_default();
         let cycles = machine.now() - from;
-        let idle = (machine.slept() - slept) as f64 / cycles.max(1) as f64;
+        let idle = (machine.profile.slept() - slept) as f64 / cycles.max(1) as f64;
         let waits = (machine.waits() - waits) as f64 / cycles.max(1) as f64;
         Load {
             clock_hz: HZ,
@@ -121,7 +121,7 @@ impl Gathered {
             stack: footprint.stack,
             flash: footprint.flash,
             ram: footprint.ram,
-            unmodelled: machine.chip().strays().iter().copied().collect(),
+            unmodelled: machine.chip().strays.iter().copied().collect(),
         }
     }
 }

@@ -19,7 +19,7 @@ use super::peripherals::system::Cause;
 
 pub use profile::{Clock, Poll, Profile};
 
-use tasks::Tasks;
+pub use tasks::Tasks;
 
 /// Content of every byte of RAM at power-up.
 pub const BLANK: u8 = 0xA5;
@@ -39,13 +39,16 @@ pub struct Machine {
     core: UnicornCore<Chip>,
     pc: u32,
     asleep: Option<Asleep>,
-    profile: Profile,
-    tasks: Tasks,
+    /// Polls of tasks, and sleep.
+    pub profile: Profile,
+    /// The tasks, by their numbers in the profile.
+    pub tasks: Tasks,
     marks: Vec<Mark>,
     restarts: Vec<(u64, Restart)>,
     /// Cycle up to which a debugger halts the core.
     halted: Option<u64>,
-    loaded: Loaded,
+    /// The image that it runs.
+    pub image: Loaded,
 }
 
 impl Machine {
@@ -54,7 +57,7 @@ impl Machine {
         let loaded = Loaded::of(elf)?;
         let counted = Counted { base: FLASH.base, bytes: &loaded.flash, code: &loaded.code };
         let chip = Chip::new(FLASH.base);
-        let mut core = UnicornCore::with_bus(&[FLASH, BELOW, RAM], &counted, chip)?;
+        let mut core = UnicornCore::new(&[FLASH, BELOW, RAM], &counted, chip)?;
         core.write(RAM.base, &vec![BLANK; RAM.size as usize])?;
         let mut machine = Self {
             core,
@@ -65,7 +68,7 @@ impl Machine {
             marks: Vec::new(),
             restarts: Vec::new(),
             halted: None,
-            loaded,
+            image: loaded,
         };
         for address in machine.tasks.marks() {
             machine.core.mark(address);
@@ -103,30 +106,10 @@ impl Machine {
         self.core.bus_mut()
     }
 
-    /// Cycles asleep since the start.
-    pub const fn slept(&self) -> u64 {
-        self.profile.slept()
-    }
-
-    /// Polls of tasks, and sleep.
-    pub fn profile_mut(&mut self) -> &mut Profile {
-        &mut self.profile
-    }
-
-    /// Names of the tasks, by their numbers in the profile.
-    pub fn tasks(&self) -> impl Iterator<Item = &str> {
-        self.tasks.names()
-    }
-
     /// Name of the task that the executor is about to poll.
     pub fn task(&self) -> Option<&str> {
         let pointer = self.core.register(Register::R(0)).ok()?;
         self.tasks.names().nth(self.tasks.begins(self.pc, pointer)?)
-    }
-
-    /// Addresses of the functions through which the executors poll tasks.
-    pub fn polls(&self) -> &[u32] {
-        self.tasks.polls()
     }
 
     /// Cycle and cause of each restart so far.
@@ -134,20 +117,16 @@ impl Machine {
         &self.restarts
     }
 
-    pub const fn image(&self) -> &Loaded {
-        &self.loaded
-    }
-
     /// Name of the function that the core is in.
     pub fn place(&self) -> &str {
-        named(&self.loaded.functions, self.pc)
+        named(&self.image.functions, self.pc)
     }
 
     /// Makes the running code hang: it continues at an instruction that branches to itself.
     pub fn hang(&mut self) -> Result<(), CoreError> {
         const TO_ITSELF: [u8; 2] = [0xFE, 0xE7];
-        let flash = &self.loaded.flash;
-        let place = self.loaded.code.iter().find_map(|code| {
+        let flash = &self.image.flash;
+        let place = self.image.code.iter().find_map(|code| {
             code.clone().step_by(2).find(|at| {
                 let at = (at - FLASH.base) as usize;
                 flash.get(at..at + 2) == Some(&TO_ITSELF)
@@ -353,7 +332,7 @@ impl Machine {
             self.apply(change)?;
             self.chip_mut().advance(now);
         }
-        if let Some(cause) = self.chip_mut().take_reset() {
+        if let Some(cause) = self.chip_mut().reset.take() {
             self.restart(cause)?;
         }
         Ok(())

@@ -5,12 +5,11 @@
 //! its own is due. What leads from one to another (interrupt lines, DMA requests, pins)
 //! is [`super::chip`]'s.
 //!
-//! To add one: implement [`Peripheral`] in a file here (`read` and `write` by offset, `None` for a
-//! register that does not exist; `deadline` and `advance` if something happens by itself; registers
-//! that only keep what is written go into a table of `Kept`). Add its address and clock in
-//! `chip/map.rs`, a field in `Chip` and an arm in `Chip::block`; its interrupt line, deadline and DMA
-//! requests in `Chip::settle_lines`; its pins in `chip/pins.rs`. Test it against the register
-//! description; in a run `unmodelled` must stay empty.
+//! To add one: implement [`Peripheral`] in a file here (`read` and `write` by offset; `deadline` and
+//! `advance` if something happens by itself; registers that only keep what is written go into
+//! [`registers::Registers`], by the names of `chip/description.rs`). Add a field in `Chip`, a line in `chip/map.rs`; its interrupt line,
+//! deadline and DMA requests in `Chip::settle_lines`; its pins in `chip/pins.rs`. Test it against the
+//! register description; in a run `unmodelled` must stay empty.
 
 pub mod adc;
 pub mod dma;
@@ -28,7 +27,7 @@ pub mod syscfg;
 pub mod system;
 pub mod time_base;
 
-use crate::rules::Rule;
+use crate::chip::Why;
 
 /// The core's clock, Hz.
 pub const HZ: u64 = 170_000_000;
@@ -48,6 +47,11 @@ impl Write {
         old & !self.mask | self.value & self.mask
     }
 
+    /// The bits written as 0.
+    pub const fn zeros(self) -> u32 {
+        !self.value & self.mask
+    }
+
     /// The bits written as 1, for registers in which the others do nothing.
     pub const fn ones(self) -> u32 {
         self.value & self.mask
@@ -62,13 +66,9 @@ pub trait Peripheral {
     /// Reads the word at this offset; `None` if no model has it.
     fn read(&mut self, offset: u32, now: u64) -> Option<u32>;
 
-    /// Writes to the word at this offset; `None` if no model has it, or not this use of it.
-    fn write(&mut self, offset: u32, write: Write, now: u64) -> Option<()>;
-
-    /// Takes the rule that the last access broke.
-    fn take_broken_rule(&mut self) -> Option<Rule> {
-        None
-    }
+    /// Writes to the word at this offset, unless no model has it, or not this use of it, or that
+    /// breaks a rule.
+    fn write(&mut self, offset: u32, write: Write, now: u64) -> Result<(), Why>;
 
     /// Cycle at which something is due by itself.
     fn deadline(&self) -> u64 {
@@ -77,4 +77,14 @@ pub trait Peripheral {
 
     /// Does what is due.
     fn advance(&mut self, _now: u64) {}
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Writes a word that the model takes.
+    pub(super) fn write(model: &mut impl Peripheral, offset: u32, value: u32, now: u64) {
+        model.write(offset, Write { value, mask: u32::MAX }, now).expect("modelled");
+    }
 }

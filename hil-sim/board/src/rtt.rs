@@ -47,7 +47,7 @@ struct Ring {
 impl Probe {
     /// Finds the control block of the image.
     pub fn of(machine: &Machine) -> Result<Self, ImageError> {
-        Ok(Self { block: machine.image().symbol(SYMBOL)?, channels: Channels::default() })
+        Ok(Self { block: machine.image.symbol(SYMBOL)?, channels: Channels::default() })
     }
 
     /// Makes the channels unknown until the program sets them up again.

@@ -74,19 +74,9 @@ pub struct RunOptions {
     pub wait_states: bool,
 }
 
-/// Runs a scenario on the board with the image in `elf`, and keeps `rows` if that is true.
-/// `watch` gets each line of the log with its time, s.
+/// Runs a scenario on the board with the image in `elf`. `watch` gets each line of the log with
+/// its time, s.
 pub fn run(
-    elf: &[u8],
-    scenario: &Scenario,
-    rows: bool,
-    watch: impl FnMut(f64, &Line),
-) -> Result<Ran, BoardError> {
-    run_with(elf, scenario, &RunOptions { rows, ..RunOptions::default() }, watch)
-}
-
-/// The same with all options.
-pub fn run_with(
     elf: &[u8],
     scenario: &Scenario,
     options: &RunOptions,
@@ -101,14 +91,14 @@ pub fn run_with(
         bench.machine.count_waits()?;
     }
     let (mut log, mut lines_of_log) = (JoinedLog::new(0), Vec::new());
-    bench.start_when_idle();
+    bench.starts = true;
     let started = Instant::now();
     let mut after = AFTER;
     let mut gathered = Gathered::default();
     let mut stream = Vec::new();
     let mut ends_at = longest_s(&scenario.rig);
     while bench.time_s() < ends_at && after > 0 {
-        let waited = bench.waits_to_start();
+        let waited = bench.starts;
         let restarts = bench.machine.restarts().len();
         log.add(bench.plant.truth());
         let t_s = bench.time_s();
@@ -119,7 +109,7 @@ pub fn run_with(
             let text = format!("{}{level}{}", line.level, line.text);
             lines_of_log.push(LogLine { t_s, text });
         }
-        if waited && !bench.waits_to_start() {
+        if waited && !bench.starts {
             gathered.begin(&mut bench.machine);
         } else {
             gathered.gather(&mut bench.machine);
@@ -151,8 +141,8 @@ pub fn run_with(
 
 /// Bytes of the stack that were used, deepest since power came up.
 pub fn stack_used(machine: &Machine) -> Result<u32, BoardError> {
-    let end = machine.image().symbol("_stack_end")?;
-    let start = machine.image().symbol("_stack_start")?;
+    let end = machine.image.symbol("_stack_end")?;
+    let start = machine.image.symbol("_stack_start")?;
     let mut stack = vec![0; start.saturating_sub(end.max(RAM.base)) as usize];
     machine.peek(end, &mut stack)?;
     let untouched = stack.iter().take_while(|byte| **byte == super::machine::BLANK).count();

@@ -1,6 +1,7 @@
 //! Mistakes in the wiring of a rig, between the chip's pins and the plant: what a first power-up
 //! has to find.
 
+use clap::ValueEnum;
 use hil_sim::bringup::{Sensor, stowed};
 use hil_sim::plant::draw::PlantParameters;
 use hil_sim::plant::rig::Drives;
@@ -19,98 +20,68 @@ const ANGLE_OFF: i32 = 900;
 /// Friction of a wheel that cannot be turned, N.
 const BLOCKED_N: f64 = 1e4;
 
-macro_rules! mistakes {
-    ($($(#[$doc:meta])* $name:ident: $text:literal,)*) => {
-        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-        pub enum Mistake {
-            $($(#[$doc])* $name,)*
-        }
-
-        impl Mistake {
-            /// Every mistake.
-            pub const ALL: &[Self] = &[$(Self::$name),*];
-
-            /// Its name on the command line.
-            pub const fn name(self) -> &'static str {
-                match self {
-                    $(Self::$name => $text,)*
-                }
-            }
-        }
-    };
-}
-
-mistakes! {
+/// A mistake in the wiring, by its name on the command line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Mistake {
     /// The option byte DBANK is 0.
-    OneBank: "one-bank",
+    OneBank,
     /// The angle encoder is not connected.
-    AngleOpen: "angle-open",
-    MagnetMissing: "magnet-missing",
+    AngleOpen,
+    MagnetMissing,
     /// Its magnet is turned over: the codes grow inwards from the right one at the stow end.
-    ArmInwards: "arm-inwards",
+    ArmInwards,
     /// The angle's zero code is far off.
-    AngleZero: "angle-zero",
+    AngleZero,
     /// The preload sensor is not connected.
-    PreloadOpen: "preload-open",
+    PreloadOpen,
     /// Its bridge is reversed.
-    PreloadReversed: "preload-reversed",
+    PreloadReversed,
     /// Preload and compression sensor are exchanged.
-    SensorsExchanged: "sensors-exchanged",
+    SensorsExchanged,
     /// The compression sensor is not connected.
-    CompressionOpen: "compression-open",
-    CompressionReversed: "compression-reversed",
+    CompressionOpen,
+    CompressionReversed,
     /// Line A of the wheel encoder is not connected.
-    EncoderA: "encoder-a",
+    EncoderA,
     /// Line B of the wheel encoder is not connected.
-    EncoderB: "encoder-b",
+    EncoderB,
     /// Neither is connected.
-    EncoderOpen: "encoder-open",
+    EncoderOpen,
     /// Lines A and B are exchanged.
-    EncoderSwapped: "encoder-swapped",
+    EncoderSwapped,
     /// The drive motor's leads are exchanged.
-    DriveLeads: "drive-leads",
+    DriveLeads,
     /// Both of these are.
-    BothSwapped: "both-swapped",
+    BothSwapped,
     /// The pre-tightener's leads are exchanged.
-    PretightenerLeads: "pretightener-leads",
-    MotorsExchanged: "motors-exchanged",
+    PretightenerLeads,
+    MotorsExchanged,
     /// The inputs of the drive's readback are exchanged.
-    ReadbackSwapped: "readback-swapped",
+    ReadbackSwapped,
     /// The readbacks of the bridges are exchanged.
-    ReadbacksExchanged: "readbacks-exchanged",
+    ReadbacksExchanged,
     /// The reference of the drive's readback is missing.
-    ReadbackReference: "readback-reference",
+    ReadbackReference,
     /// The motor supply is off.
-    SupplyOff: "supply-off",
+    SupplyOff,
     /// The emergency stop's contact is open.
-    StopOpen: "stop-open",
+    StopOpen,
     /// Its line is shorted to ground.
-    StopShorted: "stop-shorted",
+    StopShorted,
     /// Its second contact does not cut the motors' supply.
-    StopSupply: "stop-supply",
+    StopSupply,
     /// The preload sensor shows 1.5 times the preload.
-    PreloadGain: "preload-gain",
+    PreloadGain,
     /// The preload sensor has ten times its noise.
-    PreloadNoise: "preload-noise",
+    PreloadNoise,
     /// The compression sensor has ten times its noise.
-    CompressionNoise: "compression-noise",
+    CompressionNoise,
     /// The wheel cannot be turned.
-    WheelBlocked: "wheel-blocked",
+    WheelBlocked,
     /// The pull-down at the preload sensor's input is missing.
-    PreloadPullDown: "preload-pull-down",
+    PreloadPullDown,
     /// The pull-downs at the drive's bridge are missing.
-    BridgePullDowns: "bridge-pull-downs",
-}
-
-impl std::str::FromStr for Mistake {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        Self::ALL.iter().find(|mistake| mistake.name() == text).copied().ok_or_else(|| {
-            let names: Vec<&str> = Self::ALL.iter().map(|mistake| mistake.name()).collect();
-            format!("expected one of {}", names.join(", "))
-        })
-    }
+    BridgePullDowns,
 }
 
 /// The wiring of a rig, and what a hand does with it.

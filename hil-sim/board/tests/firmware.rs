@@ -12,9 +12,8 @@ use rig_board::chip::Pin;
 use rig_board::core::{Access, Bus};
 use rig_board::faults::Fault;
 use rig_board::peripherals::rcc::Cause;
-use rig_board::run::{self, Ran};
 
-use crate::common::{Board, elf, scenario};
+use crate::common::{Board, ran, scenario};
 
 fn press(board: &mut Board, pressed: bool) {
     let now = board.machine().now();
@@ -22,7 +21,7 @@ fn press(board: &mut Board, pressed: bool) {
 }
 
 fn assert_no_strays(board: &Board) {
-    let strays: Vec<_> = board.bench.machine.chip().strays().iter().collect();
+    let strays: Vec<_> = board.bench.machine.chip().strays.iter().collect();
     assert!(strays.is_empty(), "{strays:#?}");
 }
 
@@ -32,10 +31,6 @@ fn drives(board: &mut Board, milliseconds: u32) -> bool {
         let drives = board.step().drives;
         drives.drive_on && drives.drive != 0.0 || drives.preload_on && drives.preload != 0.0
     })
-}
-
-fn ran(sets: &[&str]) -> Ran {
-    run::run(elf(), &scenario(sets), false, |_, _| {}).expect("a run")
 }
 
 /// Rows of the binary log, a tick each.
@@ -141,7 +136,7 @@ fn assert_alike(board: &Recording, scenario: &Scenario) {
 }
 
 fn assert_as_in_software(sets: &[&str]) {
-    let first = ran(sets);
+    let first = ran(&scenario(sets), false);
     assert_alike(&first.recording, &scenario(sets));
     assert!(first.load.unmodelled.is_empty(), "{:#?}", first.load.unmodelled);
     assert!(first.machine.restarts().is_empty());
@@ -152,7 +147,7 @@ fn assert_as_in_software(sets: &[&str]) {
     let ticks = first.load.cycles / first.load.clock_hz.div_euclid(1000);
     assert!(first.load.tick.runs.abs_diff(ticks) <= 1, "{} of {ticks}", first.load.tick.runs);
     // Again, the same bytes.
-    let again = ran(sets);
+    let again = ran(&scenario(sets), false);
     let (a, b) = (&again.recording, &first.recording);
     assert_eq!(a.summary.trace_digest, b.summary.trace_digest);
     assert_eq!(a.log, b.log);
@@ -162,9 +157,8 @@ fn assert_as_in_software(sets: &[&str]) {
 #[test]
 fn other_rigs_run_on_the_board_as_in_software() {
     for seed in 2..=5 {
-        let sets = [&*format!("run.seed={seed}")];
-        let board = run::run(elf(), &scenario(&sets), false, |_, _| {}).expect("a run");
-        assert_alike(&board.recording, &scenario(&sets));
+        let scenario = scenario(&[&format!("run.seed={seed}")]);
+        assert_alike(&ran(&scenario, false).recording, &scenario);
     }
 }
 
@@ -174,7 +168,7 @@ fn other_rigs_run_on_the_board_as_in_software() {
 fn a_restart_under_way_ends_the_run_with_its_cause() {
     let mut scenario = scenario(&[]);
     scenario.run.faults = vec![Injection::at(Target::Supply, Kind::Weak, 2.0, 0.0)];
-    let ran = run::run(elf(), &scenario, true, |_, _| {}).expect("a run");
+    let ran = ran(&scenario, true);
     let (summary, rows) = (&ran.recording.summary, &ran.recording.rows);
     assert!(!summary.completed && summary.total_s < 4.0, "{}", summary.total_s);
     let cause = summary.restart.as_deref().expect("it is reported");
@@ -209,7 +203,7 @@ fn a_deployment_is_far_ahead_of_the_rig() {
     }
     let ahead = |_| {
         let begun = cpu_time::ThreadTime::now();
-        let load = ran(&["run.seed=1"]).load;
+        let load = ran(&scenario(&["run.seed=1"]), false).load;
         load.cycles as f64 / load.clock_hz as f64 / begun.elapsed().as_secs_f64()
     };
     let best = (0..3).map(ahead).fold(0.0, f64::max);
@@ -243,20 +237,12 @@ fn a_short_press_starts_and_holding_stops() {
 
 #[test]
 fn an_open_emergency_stop_takes_the_drive_away_until_it_is_reset() {
-    let mut board = Board::idle();
-    board.send(b's');
-    board.until("deploying: cruise", 4000);
+    let mut board = Board::moving();
     board.run(100);
-    let open = |board: &mut Board, open| {
-        let now = board.bench.machine.now();
-        for pin in [Pin::STOP_DRIVE, Pin::STOP_PRELOAD] {
-            board.machine().chip_mut().drive(pin, open, now);
-        }
-    };
-    open(&mut board, true);
+    board.open_stop(true);
     board.until("fault 151", 20);
     assert!(!drives(&mut board, 200));
-    open(&mut board, false);
+    board.open_stop(false);
     assert!(!drives(&mut board, 200), "closing the contact starts nothing");
     board.send(b'0');
     board.until("mode: idle", 1500);
@@ -266,8 +252,7 @@ fn an_open_emergency_stop_takes_the_drive_away_until_it_is_reset() {
 
 #[test]
 fn power_lost_in_the_middle_of_a_crossing_is_survived() {
-    let mut board = Board::idle();
-    board.send(b's');
+    let mut board = Board::moving();
     board.until("sliding on the corner", 8000);
     board.machine().restart(Cause::Power).expect("restarts");
     assert!(!drives(&mut board, 3000), "nothing moves before a command");
@@ -302,8 +287,7 @@ fn an_interrupt_flag_that_is_not_cleared_is_caught() {
 
 /// A run with a fault that comes when this is logged; what is logged after that.
 fn struck(text: &str, fault: Fault, milliseconds: u32) -> (Board, Vec<String>) {
-    let mut board = Board::idle();
-    board.send(b's');
+    let mut board = Board::moving();
     board.until(text, 8000);
     let from = board.log.len();
     board.strike(fault);
@@ -331,8 +315,7 @@ fn a_broken_sensor_under_way_stops_the_drive_with_a_fault() {
 
 #[test]
 fn bit_errors_that_pass_are_ridden_out() {
-    let mut board = Board::idle();
-    board.send(b's');
+    let mut board = Board::moving();
     board.until("deploying: approach", 8000);
     for _ in 0..5 {
         let fault = Fault::BitErrors(1 << 5);
@@ -350,7 +333,7 @@ fn bit_errors_that_pass_are_ridden_out() {
 #[test]
 fn the_image_contains_no_function_of_a_mathematics_library() {
     let board = Board::off(&[]);
-    let functions = &board.bench.machine.image().functions;
+    let functions = &board.bench.machine.image.functions;
     assert!(functions.len() > 100);
     let of_library = |name: &str| {
         ["libm::", "micromath::", "::float::", "::math::"].iter().any(|part| name.contains(part))

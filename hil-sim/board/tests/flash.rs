@@ -1,22 +1,15 @@
 //! Parameters stored by the firmware in the emulated board's flash, and power that goes
 //! while it writes.
 
-use hil_sim::scenario::Scenario;
 use interstage::params::compile;
 use interstage::params::link::{FrameReader, ToBoard, ToHost, frame};
 use interstage::params::service::{Origin, PIECE, Piece, Request, Response};
 use interstage::rig::Rig;
-use rig_board::bench::Bench;
 use rig_board::chip::map::PARAMETER_SETS;
 use rig_board::peripherals::flash::{Cut, Wrong};
 use rig_board::peripherals::rcc::Cause;
-use rig_board::rtt::Probe;
 
-use crate::common::{elf, strings};
-
-/// Channels of the binary line.
-const UP: u32 = 2;
-const DOWN: u32 = 1;
+use crate::common;
 
 /// A set that the image does not carry.
 fn set() -> Vec<u8> {
@@ -27,8 +20,7 @@ fn set() -> Vec<u8> {
 
 /// A board and the host at its binary line.
 struct Board {
-    bench: Bench<'static>,
-    probe: Probe,
+    board: common::Board,
     reader: FrameReader,
     number: u16,
 }
@@ -36,29 +28,16 @@ struct Board {
 impl Board {
     /// Powered up and idle.
     fn idle() -> Self {
-        let scenario = Scenario::resolve(Some("prototype"), None, &[]).expect("a scenario");
-        let bench = Bench::new(elf(), strings(), &scenario).expect("a bench");
-        let probe = Probe::of(&bench.machine).expect("a control block");
-        let mut board = Self { bench, probe, reader: FrameReader::new(), number: 0 };
-        board.until("mode: idle");
-        board
+        Self { board: common::Board::idle(), reader: FrameReader::new(), number: 0 }
     }
 
     /// Runs until the log has this text.
     fn until(&mut self, text: &str) {
-        let mut said = Vec::new();
-        for _ in 0..3000 {
-            let (_, lines) = self.bench.step().expect("runs");
-            said.extend(lines.into_iter().map(|line| line.text));
-            if said.iter().any(|line| line.contains(text)) {
-                return;
-            }
-        }
-        panic!("no `{text}`: {said:#?}");
+        self.board.until(text, 3000);
     }
 
     fn restarts(&self) -> usize {
-        self.bench.machine.restarts().len()
+        self.board.bench.machine.restarts().len()
     }
 
     /// Sends a request; no response if the board restarts first.
@@ -68,18 +47,18 @@ impl Board {
         let frame = frame(&ToBoard::Parameters(self.number, request)).expect("fits");
         let mut sent = 0;
         while sent < frame.len() {
-            sent += self.probe.down(&mut self.bench.machine, DOWN, &frame[sent..]).expect("runs");
+            sent += self.board.bench.line_send(&frame[sent..]).expect("runs");
             if sent < frame.len() {
-                self.bench.step().expect("runs");
+                self.board.step();
             }
         }
         for _ in 0..500 {
-            self.bench.step().expect("runs");
+            self.board.step();
             if self.restarts() > before {
                 self.reader = FrameReader::new();
                 return None;
             }
-            for byte in self.probe.up(&mut self.bench.machine, UP).expect("runs") {
+            for byte in self.board.bench.line_take().expect("runs") {
                 if let Some(ToHost::Parameters(number, response)) = self.reader.take(byte)
                     && number == self.number
                 {
@@ -113,7 +92,7 @@ impl Board {
     }
 
     fn operations(&self) -> u64 {
-        self.bench.machine.chip().flash.begun()
+        self.board.bench.machine.chip().flash.begun
     }
 }
 
@@ -124,11 +103,10 @@ fn a_stored_set_is_active_after_a_loss_of_power() {
     assert!(board.store(&set()));
     let stored = (Origin::Stored { sequence: 1 }, "changed".to_owned());
     assert_eq!(board.active(), stored);
-    board.bench.machine.restart(Cause::Power).expect("restarts");
+    board.board.machine().restart(Cause::Power).expect("restarts");
     board.until("mode: idle");
     assert_eq!(board.active(), stored);
-    let strays = board.bench.machine.chip().strays().count();
-    assert_eq!(strays, 0);
+    assert_eq!(board.board.machine().chip().strays.count(), 0);
 }
 
 /// The chip breaks the timers by a flag of its own, which a reset of the fault has to clear.
@@ -137,16 +115,14 @@ fn a_damaged_set_stops_the_drive_until_the_fault_is_reset() {
     let mut board = Board::idle();
     assert!(board.store(&set()));
     let place = PARAMETER_SETS + 2 * PIECE as u32;
-    board.bench.machine.spoil(place, Wrong::Check).expect("flash");
+    board.board.machine().spoil(place, Wrong::Check).expect("flash");
     board.active();
     board.until("fault 151");
     // A fault is held for a tenth of a second at least.
-    for _ in 0..150 {
-        board.bench.step().expect("runs");
-    }
-    board.bench.send(b'0').expect("runs");
+    board.board.run(150);
+    board.board.send(b'0');
     board.until("mode: idle");
-    board.bench.send(b's').expect("runs");
+    board.board.send(b's');
     board.until("deploying: cruise");
 }
 
@@ -162,11 +138,11 @@ fn power_lost_in_any_write_leaves_the_old_set_or_the_new() {
     for cut in [1, 2, 3, 4, all / 2, all - 2, all - 1, all] {
         for cut in [Cut::Within(cut), Cut::After(cut)] {
             let mut board = Board::idle();
-            board.bench.machine.chip_mut().flash.cut_power(cut);
+            board.board.machine().chip_mut().flash.cut_power(cut);
             // If the last write was over, the answer may yet have been sent.
             let done = board.store(&set) && board.restarts() == 0;
             if board.restarts() == 0 {
-                board.bench.step().expect("runs");
+                board.board.step();
             }
             board.until("mode: idle");
             assert_eq!(board.restarts(), 1, "{cut:?}");
@@ -176,11 +152,11 @@ fn power_lost_in_any_write_leaves_the_old_set_or_the_new() {
             assert!(new || origin == Origin::Image, "{cut:?}: {origin:?} {name}");
             assert!(new || !done, "{cut:?}: it had said that it is stored");
             // What the supply tore is not read any more: the chip would cut the bridges.
-            board.bench.send(b's').expect("runs");
+            board.board.send(b's');
             board.until("mode: preloading to deploy");
             assert_eq!(board.active(), (origin, name), "{cut:?}");
             board.until("deploying: cruise");
-            board.bench.send(b'x').expect("runs");
+            board.board.send(b'x');
             board.until("mode: idle");
             // A half-written set does not block the next save.
             assert!(board.store(&set), "{cut:?}");

@@ -22,14 +22,11 @@ use rig_board::bench::STEP;
 use rig_board::log::Strings;
 use rig_board::port::EmulatedPort;
 
-use crate::common::scenario;
+use crate::common::{self, scenario};
 
 fn elf() -> &'static [u8] {
     static ELF: OnceLock<Vec<u8>> = OnceLock::new();
-    ELF.get_or_init(|| {
-        let path = firmware::build(Profile::Loop).expect("the firmware builds");
-        std::fs::read(path).expect("readable")
-    })
+    ELF.get_or_init(|| firmware::image(Profile::Loop).expect("the firmware builds"))
 }
 
 fn board() -> EmulatedPort {
@@ -275,17 +272,14 @@ fn other_firmware_and_other_parameters_are_told_from_a_board_in_the_loop() {
     let error = looped(&mut board(), &fe).unwrap_err();
     assert!(matches!(&error, HilError::Parameters { board, .. } if board == "prototype"));
     assert!(error.to_string().contains("rig params restore"), "{error}");
-    let ordinary = firmware::build(Profile::Release).expect("the firmware builds");
-    let ordinary = std::fs::read(ordinary).expect("readable");
-    let mut port = EmulatedPort::new(&ordinary).expect("an image");
+    let mut port = EmulatedPort::new(common::elf()).expect("an image");
     let error = looped(&mut port, &scenario(&[])).unwrap_err();
     assert!(error.to_string().contains("feature `hil`"), "{error}");
 }
 
 #[test]
 fn an_image_is_known_by_its_hash() {
-    let ordinary = firmware::build(Profile::Release).expect("the firmware builds");
-    let ordinary = Image::of(&std::fs::read(ordinary).expect("readable")).expect("an image");
+    let ordinary = Image::of(common::elf()).expect("an image");
     let looped = Image::of(elf()).expect("an image");
     let mut port = board();
     assert_eq!(looped.is_on(&mut port), Ok(true));
@@ -306,7 +300,7 @@ fn without_a_host_the_pins_are_low_a_watchdog_runs_and_the_log_says_that_nothing
     for motor in wait(300) {
         assert_eq!((motor.duty, motor.enabled), (0.0, 0.0), "low");
     }
-    assert!(port.machine.chip().watchdog.is_started());
+    assert!(port.machine.chip().watchdog.started);
     assert_eq!(port.machine.restarts(), []);
     let strings = Strings::of(elf()).expect("it logs");
     let lines = strings.reader().read(&port.up(0).expect("runs"));

@@ -7,10 +7,12 @@ use interstage::restart::{DriveSnapshot, Reset, Restart, Stopped};
 use interstage::supervise::Mode;
 use rig_board::bench::STEP;
 use rig_board::chip::Pin;
+use rig_board::chip::description::rcc;
 use rig_board::faults::Fault;
 use rig_board::peripherals::flash::Cut;
 use rig_board::peripherals::pwr::{HOLDS, Then};
 use rig_board::peripherals::rcc::Cause;
+use rig_board::peripherals::{HZ, Peripheral};
 use rig_board::thumb::sweep;
 
 use crate::common::Board;
@@ -260,7 +262,7 @@ fn the_first_start_of_an_image_stores_its_checksum() {
 
 /// Bytes of the image: of its vectors, its code, its constants, its hash.
 fn places(board: &Board) -> Vec<u32> {
-    let image = board.bench.machine.image();
+    let image = &board.bench.machine.image;
     let last = image.flash.iter().rposition(|byte| *byte != 0xFF).expect("an image") as u32;
     let hash = image.symbol("__build_id").expect("a symbol");
     vec![0x0800_0000 + 0x1D0, board.function("panic_bounds_check"), 0x0800_0000 + last, hash + 16]
@@ -292,7 +294,7 @@ fn an_inverted_bit_of_the_image_is_reported_and_held() {
 #[test]
 fn an_image_names_no_folder_of_the_machine_that_built_it() {
     let board = Board::idle();
-    let image = &board.bench.machine.image().flash;
+    let image = &board.bench.machine.image.flash;
     let holds = |text: &str| image.windows(text.len()).any(|bytes| bytes == text.as_bytes());
     assert!(holds("src/main.rs"), "places of panics are in it");
     let home = std::env::home_dir().expect("a home");
@@ -313,8 +315,12 @@ fn a_damaged_image_that_no_longer_starts_is_reported() {
     board.assert_off(500);
 }
 
-/// An image that cannot log blinks the light; on a sound board the light is off until the first
-/// line of the log.
+/// Cycles in a second: of the oscillator that the chip starts on, and of its full clock. The
+/// emulated core counts both alike.
+const CLOCKS_HZ: [f64; 2] = [16e6, HZ as f64];
+
+/// An image that cannot log blinks the light, twice a second; on a sound board the light is off
+/// until the first line of the log.
 #[test]
 fn a_damaged_image_that_cannot_log_blinks() {
     let lit = |board: &Board| board.bench.machine.chip().level(Pin::LIGHT);
@@ -326,21 +332,29 @@ fn a_damaged_image_that_cannot_log_blinks() {
         assert!(board.log.len() > from || !lit(&board));
     }
     let mut board = Board::moving();
+    // The bit after which no start comes to its first word.
     let copies = board.function("compiler_builtins::mem::memcpy");
     board.strike(Fault::BitFlip(copies + 0x115, 4));
     board.strike(Fault::ResetPin);
     board.step();
     let from = board.log.len();
-    let mut seen = Vec::new();
+    let (mut time_s, mut lights, mut rises) = (0.0, 0, Vec::new());
+    let mut before = lit(&board);
     for _ in 0..1000 {
-        let drives = board.step().drives;
-        assert!(!drives.drive_on && !drives.preload_on);
-        seen.push(lit(&board));
+        board.assert_off(1);
+        let clock = board.machine().chip_mut().rcc.read(rcc::CFGR, 0).expect("a register");
+        time_s += STEP as f64 / CLOCKS_HZ[usize::from(rcc::cfgr::SWS.of(clock) != 1)];
+        let on = lit(&board);
+        if on && !before {
+            rises.push(time_s);
+        }
+        lights += u32::from(on);
+        before = on;
     }
     assert_eq!(board.log.len(), from, "{:#?}", &board.log[from..]);
-    let blinks = seen.windows(2).filter(|pair| !pair[0] && pair[1]).count();
-    let share = seen.iter().filter(|on| **on).count();
-    assert!(blinks >= 3 && (200..800).contains(&share), "{blinks} times, {share} ms");
+    let periods: Vec<f64> = rises.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    assert!(periods.len() >= 4 && (200..800).contains(&lights), "{rises:?}, {lights} ms");
+    assert!(periods.iter().all(|period| (0.45..=0.56).contains(period)), "{periods:.2?} s");
 }
 
 /// The floating-point unit is off until the start-up code enables it; code before that must not
@@ -348,7 +362,7 @@ fn a_damaged_image_that_cannot_log_blinks() {
 #[test]
 fn the_first_code_of_a_start_uses_no_floating_point() {
     let board = Board::idle();
-    let image = board.bench.machine.image();
+    let image = &board.bench.machine.image;
     let mut checked = 0;
     for name in
         ["__pre_init", "board::image::checksums", "interstage::restart::page::word", "Reset"]

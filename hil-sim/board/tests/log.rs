@@ -12,9 +12,8 @@ use interstage::tick::Event;
 use interstage::units::Q16;
 use rig_board::bench::STEP;
 use rig_board::peripherals::rcc::Cause;
-use rig_board::run;
 
-use crate::common::{Board, elf, scenario};
+use crate::common::{Board, ran, scenario};
 
 /// How far the log may be from the truth during a run. Position: the tolerance of the steps'
 /// places, which the controller knows from its table and corrects itself by. Preload: two
@@ -25,7 +24,7 @@ const PRELOAD_N: f64 = 1.0;
 #[test]
 fn every_tick_of_a_run_is_logged_and_runs_again_on_this_host() {
     for sets in [&["run.seed=1"][..], &["run.seed=1", "run.direction=retract"]] {
-        let ran = run::run(elf(), &scenario(sets), true, |_, _| {}).expect("a run");
+        let ran = ran(&scenario(sets), true);
         let run = Run::of_stream(&ran.recording.stream);
         assert!(run.is_complete(), "{:?}", run.marks);
         assert_eq!(run.ledger.len(), 3);
@@ -74,8 +73,8 @@ struct Ticks {
 impl Ticks {
     fn gather(&mut self, board: &mut Board) {
         let machine = &mut board.bench.machine;
-        let tick = machine.tasks().position(|name| name == "motors").expect("the tick");
-        for turn in machine.profile_mut().take_polls().iter().filter(|turn| turn.task == tick) {
+        let tick = machine.tasks.names().position(|name| name == "motors").expect("the tick");
+        for turn in machine.profile.take_polls().iter().filter(|turn| turn.task == tick) {
             self.cycles.push(turn.cycles);
             self.starts.push(turn.began);
         }
@@ -110,7 +109,7 @@ fn mute(board: &mut Board) {
     let machine = &mut board.bench.machine;
     let keeps = |name: &str| name.ends_with("exchange::Exchange::record");
     let found: Vec<u32> = machine
-        .image()
+        .image
         .functions
         .iter()
         .filter(|function| keeps(&function.name))
@@ -130,7 +129,7 @@ fn deployment(reader: Reader) -> (u32, Crossings, Ticks) {
     }
     board.until("mode: idle", 3000);
     let (mut ticks, mut crossings) = (Ticks::default(), Vec::new());
-    board.bench.machine.profile_mut().take_polls();
+    board.bench.machine.profile.take_polls();
     board.send(b's');
     for millisecond in 0..8000 {
         if reader == Reader::Stalled {
@@ -302,7 +301,7 @@ fn minutes_of_deploying_and_retracting_are_logged_without_a_gap_or_drift() {
             assert!(millisecond < 20_000, "round {round} does not arrive");
             let (_, lines) = board.bench.step().expect("runs");
             // What the emulator books of the tasks is not the board's.
-            board.bench.machine.profile_mut().take_polls();
+            board.bench.machine.profile.take_polls();
             let truth = board.bench.plant.truth();
             let now = (board.bench.time_s() * 1e3).round() as u32;
             truths.push_back((now, truth.position_mm, truth.preload_n));

@@ -4,15 +4,12 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 use hil_sim::params::set_of;
-use hil_sim::scenario::Scenario;
 use interstage::params::{ParameterSet, SCHEMA, SetError, slots};
 use interstage::rig::Rig;
-use rig_board::bench::Bench;
 use rig_board::chip::map::PARAMETER_SETS;
-use rig_board::log::Strings;
 use serde_json::Value;
 
-use crate::common::elf;
+use crate::common::Board;
 
 /// A place for the board's flash, and for files.
 struct Place(tempfile::TempDir);
@@ -111,17 +108,15 @@ fn parameters_are_read_changed_saved_and_restored() {
 /// What a board with this flash says in so many milliseconds, and whether a bridge was
 /// driven.
 fn powered(flash: &[u8], milliseconds: u32) -> (Vec<String>, bool) {
-    let strings = Strings::of(elf()).expect("it logs");
-    let mut bench = Bench::new(elf(), &strings, &Scenario::default()).expect("a bench");
-    bench.machine.poke(PARAMETER_SETS, flash).expect("flash");
-    let (mut said, mut driven) = (Vec::new(), false);
+    let mut board = Board::off(&[]);
+    board.machine().poke(PARAMETER_SETS, flash).expect("flash");
+    let mut driven = false;
     for _ in 0..milliseconds {
-        let (passed, lines) = bench.step().expect("runs");
-        driven |= passed.drives.drive_on || passed.drives.preload_on;
-        said.extend(lines.into_iter().map(|line| line.text));
+        let drives = board.step().drives;
+        driven |= drives.drive_on || drives.preload_on;
     }
-    assert!(bench.machine.restarts().is_empty(), "{said:?}");
-    (said, driven)
+    assert!(board.machine().restarts().is_empty(), "{:?}", board.log);
+    (board.log, driven)
 }
 
 /// CRC-32, bit by bit.

@@ -41,19 +41,19 @@ fn checked() -> Machine {
 #[test]
 fn the_core_passes_its_own_test() {
     let machine = checked();
-    let failed = machine.word(machine.image().symbol("FAILED").expect("a symbol")).expect("RAM");
+    let failed = machine.word(machine.image.symbol("FAILED").expect("a symbol")).expect("RAM");
     let failed: Vec<&str> =
         (0..CHECKS.len()).filter(|bit| failed >> bit & 1 != 0).map(|bit| CHECKS[bit]).collect();
     assert!(failed.is_empty(), "{failed:?}");
-    assert_eq!(machine.chip().strays().count(), 0);
+    assert_eq!(machine.chip().strays.count(), 0);
 }
 
 #[test]
 fn a_conditional_block_may_be_interrupted_in_every_place() {
     let mut machine = checked();
-    let symbol = |machine: &Machine, name| machine.image().symbol(name).expect("a symbol");
+    let symbol = |machine: &Machine, name| machine.image.symbol(name).expect("a symbol");
     let (given, returned) = (symbol(&machine, "GIVEN"), symbol(&machine, "RETURNED"));
-    let functions = machine.image().functions.iter();
+    let functions = machine.image.functions.iter();
     let block = functions.filter(|f| f.name == "conditional").map(|f| f.range.clone()).next();
     let block = block.expect("a function");
     let mut interrupted = 0;

@@ -1,13 +1,16 @@
 //! The registers as ST describes them: names, addresses, values after reset, fields.
 //!
-//! Independent of the models: nothing in [`crate::peripherals`] reads it. The chip names
-//! accesses by it and finds writes to reserved bits; a test compares the models with it.
-//! Source: `data/stm32g474.csv`, made by `data/stm32g474.py`.
+//! The one place of the registers' positions: the models take them from here, the chip names
+//! accesses by it and finds writes to reserved bits. `build.rs` makes constants of
+//! `data/stm32g474.csv`, which `data/stm32g474.py` makes of ST's SVD.
+//!
+//! The models stay independent of what the firmware expects: a description has positions and
+//! no behaviour, which is written in [`crate::peripherals`] from the reference manual. Nor is it the
+//! firmware's own, whose registers come from `stm32-metapac`, a table kept by hand since it was
+//! taken from such an SVD. With the types of that crate an error in it would be the model's too;
+//! so it shows as an access to a reserved bit, to a register that no model has, or as a failed run.
 
-use std::ops::Range;
-use std::sync::OnceLock;
-
-static TABLE: &str = include_str!("../../data/stm32g474.csv");
+include!(concat!(env!("OUT_DIR"), "/description.rs"));
 
 /// What a program can do with a field.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -26,126 +29,123 @@ pub enum FieldAccess {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Field {
     pub name: &'static str,
+    /// Offset of its register in the block, bytes.
+    pub register: u32,
     /// Its bits in the register.
     pub mask: u32,
     /// What a program can do with it.
     pub access: FieldAccess,
 }
 
-/// A register of a peripheral.
-#[derive(Clone, Debug, PartialEq, Eq)]
+impl Field {
+    const fn new(name: &'static str, register: u32, lowest: u32, bits: u32, access: char) -> Self {
+        let access = match access {
+            'r' => FieldAccess::Read,
+            'w' => FieldAccess::Write,
+            's' => FieldAccess::SetByOne,
+            'c' => FieldAccess::ClearByOne,
+            'z' => FieldAccess::ClearByZero,
+            _ => panic!("no access"),
+        };
+        Self { name, register, mask: (u32::MAX >> (32 - bits)) << lowest, access }
+    }
+
+    /// Its value in a register with this content.
+    pub const fn of(self, word: u32) -> u32 {
+        (word & self.mask) >> self.mask.trailing_zeros()
+    }
+
+    /// A value in its place.
+    pub const fn at(self, value: u32) -> u32 {
+        value << self.mask.trailing_zeros() & self.mask
+    }
+
+    /// Whether it is other than 0 in a register with this content.
+    pub const fn is_in(self, word: u32) -> bool {
+        word & self.mask != 0
+    }
+}
+
+/// Bits of these fields.
+pub const fn bits(fields: &[Field]) -> u32 {
+    let (mut bits, mut at) = (0, 0);
+    while at < fields.len() {
+        bits |= fields[at].mask;
+        at += 1;
+    }
+    bits
+}
+
+/// A register of a block.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Register {
-    /// Name of the peripheral.
-    pub peripheral: &'static str,
     /// Name of the register.
     pub name: &'static str,
-    pub address: u32,
+    /// Offset in the block, bytes.
+    pub offset: u32,
     /// Value after reset.
     pub reset: u32,
     /// Fields, from the lowest bit on.
-    pub fields: Vec<Field>,
+    pub fields: &'static [Field],
+    /// Bits of all fields.
+    pub known: u32,
+    /// Bits that a program can change.
+    pub writable: u32,
 }
 
 impl Register {
-    /// Bits of all fields that `of` accepts.
-    pub fn bits(&self, of: impl Fn(&Field) -> bool) -> u32 {
-        self.fields.iter().filter(|field| of(field)).fold(0, |bits, field| bits | field.mask)
-    }
-}
-
-/// The description of the chip.
-struct Table {
-    /// In the order of their addresses; an offset with two layouts has two entries.
-    registers: Vec<Register>,
-    interrupts: Vec<(&'static str, u8)>,
-}
-
-/// A value of the table, decimal or hexadecimal.
-fn number(text: &str) -> u32 {
-    let value =
-        text.strip_prefix("0x").map_or_else(|| text.parse(), |hex| u32::from_str_radix(hex, 16));
-    value.expect("the table holds numbers")
-}
-
-fn field(text: &'static str) -> Field {
-    let parts: Vec<&str> = text.split(':').collect();
-    let [name, lowest, bits, access] = parts[..] else { panic!("a field: {text}") };
-    let access = match access {
-        "r" => FieldAccess::Read,
-        "w" => FieldAccess::Write,
-        "s" => FieldAccess::SetByOne,
-        "c" => FieldAccess::ClearByOne,
-        "z" => FieldAccess::ClearByZero,
-        other => panic!("an access: {other}"),
-    };
-    Field { name, mask: (u32::MAX >> (32 - number(bits))) << number(lowest), access }
-}
-
-fn parse() -> Table {
-    let lines = || TABLE.lines().map(|line| line.split(',').collect::<Vec<_>>());
-    let mut table = Table { registers: Vec::new(), interrupts: Vec::new() };
-    for line in lines() {
-        match line[..] {
-            ["peripheral", peripheral, block, base] => {
-                for line in lines() {
-                    let ["register", of, name, offset, reset, fields] = line[..] else { continue };
-                    if of == block {
-                        table.registers.push(Register {
-                            peripheral,
-                            name,
-                            address: number(base) + number(offset),
-                            reset: number(reset),
-                            fields: fields.split_whitespace().map(field).collect(),
-                        });
-                    }
-                }
+    const fn new(name: &'static str, offset: u32, reset: u32, fields: &'static [Field]) -> Self {
+        let (mut writable, mut at) = (0, 0);
+        while at < fields.len() {
+            if !matches!(fields[at].access, FieldAccess::Read) {
+                writable |= fields[at].mask;
             }
-            ["interrupt", name, line] => table.interrupts.push((name, number(line) as u8)),
-            _ => {}
+            at += 1;
         }
+        Self { name, offset, reset, fields, known: bits(fields), writable }
     }
-    table.registers.sort_by_key(|register| register.address);
-    table
 }
 
-fn table() -> &'static Table {
-    static PARSED: OnceLock<Table> = OnceLock::new();
-    PARSED.get_or_init(parse)
+/// A peripheral at its place.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Peripheral {
+    /// Its name.
+    pub name: &'static str,
+    /// Address of its first register.
+    pub address: u32,
+    /// Its registers by their offsets; one with two layouts has two entries.
+    pub registers: &'static [Register],
 }
 
-/// All registers, in the order of their addresses.
-pub fn registers() -> &'static [Register] {
-    &table().registers
+/// The peripheral to which an address belongs, and the layouts of the register there.
+pub fn at(address: u32) -> Option<(Peripheral, impl Iterator<Item = &'static Register> + Clone)> {
+    let after = PERIPHERALS.partition_point(|of| of.address <= address);
+    let of = PERIPHERALS[after.checked_sub(1)?];
+    Some((of, of.registers.iter().filter(move |layout| of.address + layout.offset == address)))
 }
 
-/// The layouts of the register at an address; none if no description has it.
-pub fn at(address: u32) -> &'static [Register] {
-    let registers = registers();
-    let from = registers.partition_point(|register| register.address < address);
-    let range: Range<usize> =
-        from..from + registers[from..].iter().take_while(|r| r.address == address).count();
-    &registers[range]
-}
-
-pub fn find(peripheral: &str, name: &str) -> Option<&'static Register> {
-    registers().iter().find(|register| register.peripheral == peripheral && register.name == name)
+/// A register with its address.
+pub fn find(peripheral: &str, name: &str) -> Option<(u32, &'static Register)> {
+    let of = PERIPHERALS.iter().find(|of| of.name == peripheral)?;
+    let register = of.registers.iter().find(|register| register.name == name)?;
+    Some((of.address + register.offset, register))
 }
 
 /// Number of an interrupt.
 pub fn interrupt(name: &str) -> Option<u8> {
-    table().interrupts.iter().find(|(known, _)| *known == name).map(|(_, number)| *number)
+    INTERRUPTS.iter().find(|(known, _)| *known == name).map(|(_, number)| *number)
 }
 
 /// Bits that a write to an address can change, and of the bits written as 1 those that no field
 /// has and that are not 1 after reset. An address without a description has no reserved bits.
 pub fn writable(address: u32, ones: u32) -> (u32, u32) {
-    let layouts = at(address);
-    if layouts.is_empty() {
-        return (u32::MAX, 0);
+    match at(address) {
+        Some((_, layouts)) if layouts.clone().next().is_some() => {
+            let known = layouts.clone().fold(0, |bits, layout| bits | layout.known | layout.reset);
+            (layouts.fold(0, |bits, layout| bits | layout.writable), ones & !known)
+        }
+        _ => (u32::MAX, 0),
     }
-    let any = |of: &dyn Fn(&Register) -> u32| layouts.iter().fold(0, |bits, r| bits | of(r));
-    let known = any(&|register| register.bits(|_| true) | register.reset);
-    (any(&|register| register.bits(|field| field.access != FieldAccess::Read)), ones & !known)
 }
 
 #[cfg(test)]
@@ -154,21 +154,22 @@ mod tests {
 
     #[test]
     fn a_register_is_found_by_name_and_by_address_with_its_fields() {
-        let register = find("TIM8", "BDTR").expect("described");
-        assert_eq!(register.address, 0x4001_3444);
-        let moe = register.fields.iter().find(|field| field.name == "MOE").expect("described");
-        assert_eq!((moe.mask, moe.access), (1 << 15, FieldAccess::Write));
-        assert_eq!(at(0x4001_3418).len(), 2, "compare and capture");
-        assert!(at(0x4001_0800).is_empty());
+        let (address, register) = find("TIM8", "BDTR").expect("described");
+        assert_eq!((address, register.offset), (0x4001_3444, tim1::BDTR));
+        let moe = Field::new("MOE", 0x44, 15, 1, 'w');
+        assert!(register.fields.contains(&moe) && tim1::bdtr::MOE == moe && moe.mask == 1 << 15);
+        let layouts = |address| at(address).map(|(_, layouts)| layouts.count());
+        assert_eq!(layouts(0x4001_3418), Some(2), "compare and capture");
+        assert_eq!((layouts(0x4001_0800), layouts(0x3FFF_FFFC)), (Some(0), None));
         assert_eq!(interrupt("DMA1_CH8"), Some(96));
     }
 
     #[test]
     fn a_reserved_bit_is_one_that_no_field_has() {
-        let lock = find("GPIOC", "LCKR").expect("described").address;
+        let address = |peripheral, name| find(peripheral, name).expect("described").0;
+        let lock = address("GPIOC", "LCKR");
         assert_eq!(writable(lock, 0xFFFE_0001), (0x1_FFFF, 0xFFFE_0000));
         assert_eq!(writable(0xE000_ED08, u32::MAX), (u32::MAX, 0), "not described");
-        let control = find("RCC", "CR").expect("described").address;
-        assert_eq!(writable(control, 1 << 10).0 & 1 << 10, 0, "HSIRDY is only read");
+        assert_eq!(writable(address("RCC", "CR"), 0).0 & 1 << 10, 0, "HSIRDY is only read");
     }
 }

@@ -25,42 +25,37 @@ impl Pin {
 pub(super) const OUTSIDE: [(u32, u32); 7] =
     [(0, 0), (1 << 12 | 1 << 7, 0), (1 << 13, 0), (0, 0), (0, 0), (0, 0), (0, 0)];
 
-/// Lines of the wheel encoder: TIM5 is their alternate function 2.
-const WHEEL: [Pin; 2] = [Pin(0, 0), Pin(0, 1)];
-const WHEEL_FUNCTION: u32 = 2;
-/// Lines of the angle sensor: clock, to the board, from the board; SPI1 is function 5.
-const ANGLE: [Pin; 3] = [Pin(1, 3), Pin(0, 6), Pin(0, 7)];
-const ANGLE_FUNCTION: u32 = 5;
+/// A pin with the number of its alternate function.
+type Carried = (Pin, u32);
+
+/// Lines of the wheel encoder at TIM5.
+const WHEEL: [Carried; 2] = [(Pin(0, 0), 2), (Pin(0, 1), 2)];
+/// Lines of the angle sensor at SPI1: clock, to the board, from the board.
+const ANGLE: [Carried; 3] = [(Pin(1, 3), 5), (Pin(0, 6), 5), (Pin(0, 7), 5)];
 /// Analogue inputs: pin and channel of ADC1 and of ADC2, then two of ADC3.
 const ANALOG: [(Pin, usize); 4] = [(Pin(2, 2), 8), (Pin(2, 3), 9), (Pin(1, 0), 12), (Pin(1, 1), 1)];
 
 /// Wiring of a motor's bridge.
 struct Wired {
-    pwm: Pin,
-    pwm_function: u32,
+    pwm: Carried,
     forward: Pin,
     enable: Pin,
-    stop: Pin,
-    stop_function: u32,
+    stop: Carried,
 }
 
 /// Drive and pre-tightener.
 const BRIDGES: [Wired; 2] = [
     Wired {
-        pwm: Pin(0, 8),
-        pwm_function: 6,
+        pwm: (Pin(0, 8), 6),
         forward: Pin(0, 9),
         enable: Pin(0, 10),
-        stop: Pin::STOP_DRIVE,
-        stop_function: 6,
+        stop: (Pin::STOP_DRIVE, 6),
     },
     Wired {
-        pwm: Pin(2, 6),
-        pwm_function: 4,
+        pwm: (Pin(2, 6), 4),
         forward: Pin(2, 8),
         enable: Pin(2, 9),
-        stop: Pin::STOP_PRELOAD,
-        stop_function: 5,
+        stop: (Pin::STOP_PRELOAD, 5),
     },
 ];
 
@@ -139,6 +134,11 @@ impl Chip {
         self.ports[pin.0].role(pin.1)
     }
 
+    /// Whether a peripheral has this pin.
+    fn carries(&self, (pin, function): Carried) -> bool {
+        self.role(pin) == Role::Alternate(function)
+    }
+
     pub fn level(&self, pin: Pin) -> bool {
         self.ports[pin.0].level(pin.1)
     }
@@ -159,7 +159,7 @@ impl Chip {
         }
         // An open line has its pull-up.
         let [a, b] = self.outside_lines();
-        for (pin, level) in WHEEL.into_iter().zip([a, b]) {
+        for ((pin, _), level) in WHEEL.into_iter().zip([a, b]) {
             self.ports[pin.0].drive(pin.1, level);
         }
     }
@@ -171,7 +171,7 @@ impl Chip {
 
     /// Levels at the inputs of the encoder's counter; low until its pins are configured.
     fn wheel_lines(&self) -> [bool; 2] {
-        let wired = WHEEL.iter().all(|pin| self.role(*pin) == Role::Alternate(WHEEL_FUNCTION));
+        let wired = WHEEL.into_iter().all(|line| self.carries(line));
         self.outside_lines().map(|level| wired && level.unwrap_or(true))
     }
 
@@ -211,7 +211,7 @@ impl Chip {
 
     /// A frame on the angle sensor's bus.
     pub(super) fn exchange(&mut self, frame: Frame) -> u16 {
-        let wired = ANGLE.iter().all(|pin| self.role(*pin) == Role::Alternate(ANGLE_FUNCTION));
+        let wired = ANGLE.into_iter().all(|line| self.carries(line));
         let low = self.role(Pin::SELECT) == Role::Output && !self.level(Pin::SELECT);
         let selected = wired && low && !self.deselected;
         self.deselected = !low;
@@ -235,14 +235,14 @@ impl Chip {
         let broken = self.system_breaks();
         for (index, wired) in BRIDGES.iter().enumerate() {
             self.motors[index].set_system_break(broken, now);
-            let reaches = self.role(wired.stop) == Role::Alternate(wired.stop_function);
-            let open = reaches && self.level(wired.stop) && !self.defects.stop_shorted;
+            let (stop, _) = wired.stop;
+            let open = self.carries(wired.stop) && self.level(stop) && !self.defects.stop_shorted;
             self.motors[index].set_break(open, now);
             let floats = index == 0 && self.defects.drive_bridge_floats;
             let out = |pin: Pin| self.ports[pin.0].puts_out(pin.1);
             let lines = Lines {
-                timed: self.role(wired.pwm) == Role::Alternate(wired.pwm_function),
-                high: floats && self.role(wired.pwm) != Role::Output,
+                timed: self.carries(wired.pwm),
+                high: floats && self.role(wired.pwm.0) != Role::Output,
                 forward: out(wired.forward),
                 on: out(wired.enable) || floats && self.role(wired.enable) != Role::Output,
             };

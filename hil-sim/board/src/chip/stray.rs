@@ -10,16 +10,20 @@ use crate::core::Access;
 use crate::rules::Rule;
 
 /// What is wrong with an access.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, thiserror::Error)]
 #[serde(rename_all = "snake_case")]
 pub enum Why {
     /// No model implements the register, or this use of it.
+    #[error("not modelled")]
     NoModel,
     /// The peripheral's clock is off.
+    #[error("clock off")]
     NoClock,
     /// These bits, written as 1, are reserved.
+    #[error("reserved bits {0:#x}")]
     Reserved(u32),
     /// The access broke a rule of the chip.
+    #[error("{0}")]
     Broken(Rule),
 }
 
@@ -44,27 +48,8 @@ pub struct Stray {
 
 impl fmt::Display for Stray {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let access = if self.write { "write to" } else { "read of" };
-        let why = match self.why {
-            Why::NoModel => "not modelled",
-            Why::NoClock => "clock off",
-            Why::Reserved(bits) => {
-                return self.write(f, access, format_args!("reserved bits {bits:#x}"));
-            }
-            Why::Broken(rule) => return self.write(f, access, format_args!("{rule}")),
-        };
-        self.write(f, access, format_args!("{why}"))
-    }
-}
-
-impl Stray {
-    fn write(
-        &self,
-        f: &mut fmt::Formatter<'_>,
-        access: &str,
-        why: fmt::Arguments<'_>,
-    ) -> fmt::Result {
-        let Self { peripheral, register, name, count, pc, .. } = self;
+        let Self { peripheral, register, name, write, why, count, pc } = self;
+        let access = if *write { "write to" } else { "read of" };
         let gap = if name.is_empty() { "" } else { " " };
         write!(
             f,
@@ -73,12 +58,9 @@ impl Stray {
     }
 }
 
-/// Registers whose reserved bits the firmware's libraries write as 1, and why that is accepted.
-const ACCEPTED: [(&str, &str, &str); 1] = [(
-    "TIM2",
-    "SR",
-    "embassy-stm32 0.6 writes the complement of the flags; where a 0 clears, a 1 does nothing",
-)];
+/// Registers whose reserved bits the firmware's libraries write as 1: embassy-stm32 0.6 writes
+/// the complement of the flags, and where a 0 clears, a 1 does nothing.
+const ACCEPTED: [(&str, &str); 1] = [("TIM2", "SR")];
 
 /// All such accesses.
 #[derive(Clone, Debug, Default)]
@@ -95,12 +77,13 @@ impl Strays {
         why: Why,
     ) {
         let key = (peripheral, register, write, why);
-        let described = description::at(access.address & !3).first();
-        let (peripheral, name) = described.map_or((peripheral, ""), |r| (r.peripheral, r.name));
+        let described = description::at(access.address & !3)
+            .and_then(|(of, mut layouts)| Some((of.name, layouts.next()?.name)));
+        let (peripheral, name) = described.unwrap_or((peripheral, ""));
         let first = Stray { peripheral, register, name, write, why, count: 0, pc: access.pc };
         let accepted = match why {
-            Why::Broken(rule) => rule.accepted().is_some(),
-            Why::Reserved(_) => ACCEPTED.iter().any(|(of, n, _)| (*of, *n) == (peripheral, name)),
+            Why::Broken(rule) => rule.is_accepted(),
+            Why::Reserved(_) => ACCEPTED.contains(&(peripheral, name)),
             Why::NoModel | Why::NoClock => false,
         };
         let list = if accepted { &mut self.1 } else { &mut self.0 };
@@ -112,7 +95,7 @@ impl Strays {
         self.0.values()
     }
 
-    /// Those for which there is a reason: [`Rule::accepted`], and the time driver's flags.
+    /// Those for which there is a reason: [`Rule::is_accepted`], and the time driver's flags.
     pub fn accepted(&self) -> impl Iterator<Item = &Stray> {
         self.1.values()
     }

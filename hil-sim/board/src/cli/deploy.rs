@@ -43,7 +43,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     let options = RunOptions { rows: directory.is_some(), wait_states: true };
     let ran = {
         let _progress = (!args.log).then(|| progress::spinner(scenario.run.direction.name()));
-        run::run_with(&elf, &scenario, &options, show).map_err(Failure::run)?
+        run::run(&elf, &scenario, &options, show).map_err(Failure::run)?
     };
     let missed = ran.load.missed();
     let mut files = Vec::new();
@@ -90,23 +90,11 @@ fn in_the_loop(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::load::Cost;
 
     #[test]
     fn a_budget_that_is_missed_fails_the_run() {
         let summary = Summary { completed: true, ..Summary::default() };
-        let load = |load| Load {
-            clock_hz: 170_000_000,
-            cycles: 1,
-            load,
-            load_with_waits: None,
-            tick: Cost::default(),
-            stack_used: 1,
-            stack: 8192,
-            flash: 1,
-            ram: 1,
-            unmodelled: Vec::new(),
-        };
+        let load = |load| Load { load, ..Load::default() };
         assert_eq!(outcome(&summary, &load(0.05)), Outcome::Good);
         assert_eq!(outcome(&summary, &load(0.5)), Outcome::Bad);
         assert_eq!(outcome(&Summary::default(), &load(0.05)), Outcome::Bad);

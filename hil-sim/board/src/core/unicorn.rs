@@ -125,16 +125,9 @@ fn forget_condition<B: Bus>(uc: &mut Hooked<'_, B>) -> Result<(), uc_error> {
     uc.reg_write(RegisterARM::EPSR, THUMB)
 }
 
-impl UnicornCore {
-    /// A core with these memories and nothing else, counting the cycles of `counted`.
-    pub fn new(memories: &[Memory], counted: &Counted<'_>) -> Result<Self, CoreError> {
-        Self::with_bus(memories, counted, NoBus)
-    }
-}
-
 impl<B: Bus + 'static> UnicornCore<B> {
     /// A core with these memories and a bus, counting the cycles of `counted`.
-    pub fn with_bus(memories: &[Memory], counted: &Counted<'_>, bus: B) -> Result<Self, CoreError> {
+    pub fn new(memories: &[Memory], counted: &Counted<'_>, bus: B) -> Result<Self, CoreError> {
         let ranges = bus.ranges();
         let inside =
             Inside { count: Count::new(counted), bus, marks: Vec::new(), spoilt: Vec::new() };
@@ -281,14 +274,8 @@ impl<B: Bus + 'static> UnicornCore<B> {
         engine("map the bus", mapped)
     }
 
-    /// Runs from `address` until a hook stops it, it gets to `until`, or it has executed so many
-    /// instructions, if that is not 0.
-    fn go(
-        &mut self,
-        address: u32,
-        cycles: u64,
-        (until, instructions): (u64, usize),
-    ) -> Result<Stop, CoreError> {
+    /// Runs from `address` until a hook stops it or it gets to `until`.
+    fn go(&mut self, address: u32, cycles: u64, until: u64) -> Result<Stop, CoreError> {
         self.choose_hooks()?;
         let count = &mut self.engine.get_data_mut().count;
         count.stop = None;
@@ -297,7 +284,7 @@ impl<B: Bus + 'static> UnicornCore<B> {
         count.next = address & !1;
         let mut address = address;
         let ended = loop {
-            let ended = self.engine.emu_start(u64::from(address | 1), until, 0, instructions);
+            let ended = self.engine.emu_start(u64::from(address | 1), until, 0, 0);
             let count = &self.engine.get_data().count;
             match count.stop {
                 Some(Stop::Spent(at)) if !count.wanted.is_empty() => address = at,
@@ -318,15 +305,10 @@ impl<B: Bus + 'static> UnicornCore<B> {
     }
 }
 
-/// The engine's name of R0 to R12.
-fn general(number: u8) -> i32 {
-    // The engine numbers R0 to R12 in sequence.
-    RegisterARM::R0 as i32 + i32::from(number)
-}
-
 fn name(register: Register) -> i32 {
     match register {
-        Register::R(number) => general(number),
+        // The engine numbers R0 to R12, and S0 to S31, in sequence.
+        Register::R(number) => RegisterARM::R0 as i32 + i32::from(number),
         Register::Sp => RegisterARM::SP as i32,
         Register::Lr => RegisterARM::LR as i32,
         Register::Pc => RegisterARM::PC as i32,
@@ -336,7 +318,6 @@ fn name(register: Register) -> i32 {
         Register::Primask => RegisterARM::PRIMASK as i32,
         Register::Basepri => RegisterARM::BASEPRI as i32,
         Register::Faultmask => RegisterARM::FAULTMASK as i32,
-        // S0 to S31 too.
         Register::Float(number) => RegisterARM::S0 as i32 + i32::from(number),
         Register::Fpscr => RegisterARM::FPSCR as i32,
     }
@@ -381,13 +362,13 @@ impl<B: Bus + 'static> UnicornCore<B> {
 
     /// Runs from `address` until something stops the core, `cycles` at most.
     pub fn run(&mut self, address: u32, cycles: u64) -> Result<Stop, CoreError> {
-        self.go(address, cycles, (u64::MAX, 0))
+        self.go(address, cycles, u64::MAX)
     }
 
     /// The same, or until the program gets to `until`. Slow: the engine translates again.
     pub fn run_to(&mut self, address: u32, cycles: u64, until: u32) -> Result<Stop, CoreError> {
         engine("forget code", self.engine.ctl_flush_tb())?;
-        let stop = self.go(address, cycles, (u64::from(until & !1), 0))?;
+        let stop = self.go(address, cycles, u64::from(until & !1))?;
         engine("forget code", self.engine.ctl_flush_tb())?;
         Ok(match stop {
             Stop::Wait(at) if at & !1 == until & !1 => Stop::Spent(at),

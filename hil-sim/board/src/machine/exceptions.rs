@@ -81,9 +81,7 @@ impl Machine {
     /// The program caused a fault at `at`.
     pub(super) fn fault(&mut self, cause: Cause, at: u32) -> Result<(), CoreError> {
         let masked = self.core.register(Register::Primask)? & 1 != 0;
-        let system = &mut self.chip_mut().system;
-        let exceptions = system.exceptions.clone();
-        match system.control.fault(cause, &exceptions, masked) {
+        match self.chip_mut().system.fault(cause, masked) {
             Some(number) => {
                 let now = self.now();
                 self.chip_mut().system.exceptions.pend(number, now);
@@ -99,8 +97,7 @@ impl Machine {
 
     /// There is no memory for the frame of exception `number`.
     fn stacking_failed(&mut self, number: u8, back: u32, cause: Cause) -> Result<(), CoreError> {
-        let exceptions = self.chip().system.exceptions.clone();
-        let fault = self.chip_mut().system.control.fault(cause, &exceptions, true);
+        let fault = self.chip_mut().system.fault(cause, true);
         if number == HARD_FAULT || fault.is_none() {
             self.pc = back;
             self.lock_up();

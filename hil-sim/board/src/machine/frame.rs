@@ -3,8 +3,11 @@
 //! Source: ARMv7-M Architecture Reference Manual, B1.5.6 to B1.5.8. The floating-point
 //! registers are stacked at once; lazy stacking writes them later to the same addresses.
 
+use crate::chip::Chip;
 use crate::core::unicorn::UnicornCore;
-use crate::core::{Bus, CoreError, Register};
+use crate::core::{CoreError, Register};
+
+type Core = UnicornCore<Chip>;
 
 /// Bytes of a frame without and with floating-point registers.
 const BASIC: u32 = 0x20;
@@ -28,17 +31,14 @@ const SAVED: [Register; 6] =
     [Register::R(0), Register::R(1), Register::R(2), Register::R(3), Register::R(12), Register::Lr];
 
 /// Where the next frame lies: its address and its bytes.
-pub(super) fn next(core: &UnicornCore<impl Bus + 'static>) -> Result<(u32, u32), CoreError> {
+pub(super) fn next(core: &Core) -> Result<(u32, u32), CoreError> {
     let float = core.register(Register::Control)? & FLOAT_CONTEXT != 0;
     let bytes = if float { EXTENDED } else { BASIC };
     Ok((core.register(Register::Sp)?.wrapping_sub(bytes) & !7, bytes))
 }
 
 /// Pushes a frame that returns to `back`; false if there is no memory for it.
-pub(super) fn push(
-    core: &mut UnicornCore<impl Bus + 'static>,
-    back: u32,
-) -> Result<bool, CoreError> {
+pub(super) fn push(core: &mut Core, back: u32) -> Result<bool, CoreError> {
     let status = core.register(Register::Xpsr)?;
     let float = core.register(Register::Control)? & FLOAT_CONTEXT != 0;
     let stack = core.register(Register::Sp)?;
@@ -62,11 +62,7 @@ pub(super) fn push(
 }
 
 /// Enters handler mode for exception `number`; `nested` if another one is active.
-pub(super) fn go_to_handler(
-    core: &mut UnicornCore<impl Bus + 'static>,
-    number: u8,
-    nested: bool,
-) -> Result<(), CoreError> {
+pub(super) fn go_to_handler(core: &mut Core, number: u8, nested: bool) -> Result<(), CoreError> {
     let control = core.register(Register::Control)?;
     let mut back = 0xFFFF_FFE1 | RETURN_BASIC;
     if control & FLOAT_CONTEXT != 0 {
@@ -84,10 +80,7 @@ pub(super) fn go_to_handler(
 }
 
 /// Sets the status for the handler of exception `number`.
-pub(super) fn change_handler(
-    core: &mut UnicornCore<impl Bus + 'static>,
-    number: u8,
-) -> Result<(), CoreError> {
+pub(super) fn change_handler(core: &mut Core, number: u8) -> Result<(), CoreError> {
     let status = core.register(Register::Xpsr)?;
     let status = status & !(CONDITIONAL | EXCEPTION) | THUMB | u32::from(number);
     // The engine changes to the main stack with the number.
@@ -96,10 +89,7 @@ pub(super) fn change_handler(
 
 /// Pops the frame of this return value, and restores its mode. Returns the address at which
 /// the program continues; `None` if the frame is not in memory.
-pub(super) fn pop(
-    core: &mut UnicornCore<impl Bus + 'static>,
-    value: u32,
-) -> Result<Option<u32>, CoreError> {
+pub(super) fn pop(core: &mut Core, value: u32) -> Result<Option<u32>, CoreError> {
     let float = value & RETURN_BASIC == 0;
     let process = value & RETURN_PROCESS != 0;
     let pointer = if process { Register::Psp } else { Register::Sp };

@@ -9,8 +9,9 @@ const POLL: &str = "TaskStorage<F>::poll";
 /// Name of the memory of a task inside the function that spawns it.
 const POOL: &str = "POOL";
 
+/// The tasks of an image.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Tasks {
+pub struct Tasks {
     /// Address of a task's memory, and its name, in the order of the addresses.
     pools: Vec<(u32, String)>,
     /// Where a poll begins.
@@ -50,12 +51,12 @@ impl Tasks {
     }
 
     /// Where polls begin.
-    pub(super) fn polls(&self) -> &[u32] {
+    pub fn polls(&self) -> &[u32] {
         &self.polls
     }
 
-    /// Names, by the numbers that [`Tasks::begins`] gives.
-    pub(super) fn names(&self) -> impl Iterator<Item = &str> {
+    /// Names, by the numbers in the profile.
+    pub fn names(&self) -> impl Iterator<Item = &str> {
         self.pools.iter().map(|(_, name)| name.as_str())
     }
 }

@@ -12,23 +12,17 @@
 mod converter;
 
 use super::{Peripheral, Write};
+use crate::chip::Why;
+use crate::chip::description::adc1::{CR, ISR};
+use crate::chip::description::adc12_common::{self, ccr};
 use crate::rules::Rule;
 
 use converter::Converter;
 
-const ISR: u32 = 0x00;
-const CR: u32 = 0x08;
-const CFGR: u32 = 0x0C;
-const CFGR2: u32 = 0x10;
-const SMPR1: u32 = 0x14;
-const SQR1: u32 = 0x30;
-const JSQR: u32 = 0x4C;
-/// First of the four data registers of the injected conversions.
-const JDR: u32 = 0x80;
-/// Data register.
-pub(crate) const DR: u32 = 0x40;
+/// Offset of the second converter, and of the common registers.
+const STRIDE: u32 = 0x100;
 const COMMON: u32 = 0x300;
-const CCR: u32 = 0x308;
+const CCR: u32 = COMMON + adc12_common::CCR;
 
 /// The pair.
 #[derive(Clone, Debug)]
@@ -37,13 +31,12 @@ pub struct Adc {
     common: u32,
     /// Codes of 16 bits at the inputs: converter, channel.
     inputs: [[u16; 20]; 2],
-    broken: Option<Rule>,
 }
 
 impl Default for Adc {
     fn default() -> Self {
         let converters = [Converter::new(), Converter::new()];
-        Self { converters, common: 0, inputs: [[0; 20]; 2], broken: None }
+        Self { converters, common: 0, inputs: [[0; 20]; 2] }
     }
 }
 
@@ -54,15 +47,14 @@ impl Adc {
     }
 
     pub fn wants_dma(&self, converter: usize) -> bool {
-        let converter = &self.converters[converter];
-        converter.wants_dma(converter.registers.get(CFGR))
+        self.converters[converter].wants_dma()
     }
 
     /// Cycles of the core in a clock of the converters.
     fn clock(&self) -> u64 {
         const PRESCALERS: [u64; 12] = [1, 2, 4, 6, 8, 10, 12, 16, 32, 64, 128, 256];
-        match self.common >> 16 & 3 {
-            0 => PRESCALERS.get((self.common >> 18 & 0xF) as usize).copied().unwrap_or(256),
+        match ccr::CKMODE.of(self.common) {
+            0 => PRESCALERS.get(ccr::PRESC.of(self.common) as usize).copied().unwrap_or(256),
             mode => 1 << (mode - 1),
         }
     }
@@ -72,37 +64,33 @@ impl Peripheral for Adc {
     fn read(&mut self, offset: u32, now: u64) -> Option<u32> {
         match offset {
             CCR => Some(self.common),
-            0..COMMON => self.converters.get_mut((offset >> 8) as usize)?.read(offset & 0xFF, now),
-            _ => None,
+            _ => {
+                let converter = self.converters.get_mut((offset / STRIDE) as usize)?;
+                converter.read(offset % STRIDE, now)
+            }
         }
     }
 
-    fn write(&mut self, offset: u32, write: Write, now: u64) -> Option<()> {
+    fn write(&mut self, offset: u32, write: Write, now: u64) -> Result<(), Why> {
         if offset == CCR {
             let next = write.onto(self.common);
             if next != self.common && self.converters.iter().any(Converter::is_enabled) {
-                self.broken = Some(Rule::AdcDisabledOnly);
-            } else {
-                self.common = next;
+                return Err(Why::Broken(Rule::AdcDisabledOnly));
             }
-            return Some(());
+            self.common = next;
+            return Ok(());
         }
         let clock = self.clock();
-        let converter = self.converters.get_mut((offset >> 8) as usize)?;
-        match offset & 0xFF {
+        let converter = self.converters.get_mut((offset / STRIDE) as usize).ok_or(Why::NoModel)?;
+        match offset % STRIDE {
             ISR => {
                 converter.settle(now);
-                converter.flags &= !write.ones();
-                Some(())
+                converter.registers.clear(ISR, write.ones());
+                Ok(())
             }
             CR => converter.write_control(write, clock, now),
             offset => converter.configure(offset, write),
         }
-    }
-
-    fn take_broken_rule(&mut self) -> Option<Rule> {
-        let own = self.converters.iter_mut().find_map(|converter| converter.broken.take());
-        own.or(self.broken.take())
     }
 
     fn deadline(&self) -> u64 {

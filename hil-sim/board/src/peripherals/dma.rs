@@ -5,28 +5,19 @@
 //!
 //! Source: RM0440, chapters of DMA and DMAMUX.
 
-use super::registers::{Kept, Registers};
+use super::registers::Registers;
 use super::{Peripheral, Write};
+use crate::chip::Why;
+use crate::chip::description::dma1::*;
+use crate::chip::description::{DMAMUX, Field, bits, dmamux};
 use crate::rules::Rule;
 
 pub const CHANNELS: usize = 8;
 
-const ISR: u32 = 0x00;
-const IFCR: u32 = 0x04;
-const FIRST: u32 = 0x08;
-const STRIDE: u32 = 0x14;
+/// Bytes from a channel's registers to the next's.
+const STRIDE: u32 = CH2_CR - CH1_CR;
 
-const ENABLE: u32 = 1;
-const FROM_MEMORY: u32 = 1 << 4;
-const CIRCULAR: u32 = 1 << 5;
-const STEP_PERIPHERAL: u32 = 1 << 6;
-const STEP_MEMORY: u32 = 1 << 7;
-const MEMORY_TO_MEMORY: u32 = 1 << 14;
-/// Flags of a channel: any, complete, half, error.
-const COMPLETE: u32 = 1 << 1;
-const HALF: u32 = 1 << 2;
-const ERROR: u32 = 1 << 3;
-
+/// A channel, with the offsets and fields of the first.
 #[derive(Clone, Copy, Debug, Default)]
 struct Channel {
     config: u32,
@@ -53,25 +44,24 @@ pub struct Move {
 #[derive(Clone, Debug, Default)]
 pub struct Dma {
     channels: [Channel; CHANNELS],
-    broken: Option<Rule>,
 }
 
 impl Dma {
     /// The transfer that channel `index` makes at a request.
     pub fn due(&self, index: usize) -> Option<Move> {
         let c = self.channels.get(index)?;
-        if c.config & ENABLE == 0 || c.left == 0 {
+        if !ch1_cr::EN.is_in(c.config) || c.left == 0 {
             return None;
         }
-        let bytes = |shift: u32| 1 << (c.config >> shift & 3).min(2);
-        let (memory, peripheral) = (bytes(10), bytes(8));
-        let at = |base: u32, bytes: u32, steps: u32| {
-            if c.config & steps == 0 { base } else { base + bytes * c.done }
+        let bytes = |size: Field| 1 << size.of(c.config).min(2);
+        let (memory, peripheral) = (bytes(ch1_cr::MSIZE), bytes(ch1_cr::PSIZE));
+        let at = |base: u32, bytes: u32, steps: Field| {
+            if steps.is_in(c.config) { base + bytes * c.done } else { base }
         };
         Some(Move {
             channel: index,
-            memory: (at(c.memory, memory, STEP_MEMORY), memory),
-            peripheral: (at(c.peripheral, peripheral, STEP_PERIPHERAL), peripheral),
+            memory: (at(c.memory, memory, ch1_cr::MINC), memory),
+            peripheral: (at(c.peripheral, peripheral, ch1_cr::PINC), peripheral),
         })
     }
 
@@ -79,18 +69,18 @@ impl Dma {
     pub fn moved(&mut self, index: usize, found: bool) {
         let c = &mut self.channels[index];
         if !found {
-            c.flags |= ERROR;
-            c.config &= !ENABLE;
+            c.flags |= isr::TEIF1.mask;
+            c.config &= !ch1_cr::EN.mask;
             return;
         }
         c.left -= 1;
         c.done += 1;
         if c.done * 2 == c.total {
-            c.flags |= HALF;
+            c.flags |= isr::HTIF1.mask;
         }
         if c.left == 0 {
-            c.flags |= COMPLETE;
-            if c.config & CIRCULAR != 0 {
+            c.flags |= isr::TCIF1.mask;
+            if ch1_cr::CIRC.is_in(c.config) {
                 c.left = c.total;
                 c.done = 0;
             }
@@ -100,15 +90,16 @@ impl Dma {
     /// Whether a channel requests its interrupt.
     pub fn requests(&self, index: usize) -> bool {
         // Flags and their enables have the same bits.
-        self.channels[index].flags & self.channels[index].config & (COMPLETE | HALF | ERROR) != 0
+        let enables = bits(&[ch1_cr::TCIE, ch1_cr::HTIE, ch1_cr::TEIE]);
+        self.channels[index].flags & self.channels[index].config & enables != 0
     }
 }
 
-/// Channel and register of an offset.
+/// Channel of an offset, and the same register's offset in the first.
 fn place(offset: u32) -> Option<(usize, u32)> {
-    let rest = offset.checked_sub(FIRST)?;
-    let (channel, register) = ((rest / STRIDE) as usize, rest % STRIDE);
-    (channel < CHANNELS && register < 0x10).then_some((channel, register))
+    let rest = offset.checked_sub(CH1_CR)?;
+    let (channel, register) = ((rest / STRIDE) as usize, CH1_CR + rest % STRIDE);
+    (channel < CHANNELS && register <= CH1_MAR).then_some((channel, register))
 }
 
 impl Peripheral for Dma {
@@ -124,112 +115,76 @@ impl Peripheral for Dma {
         let (channel, register) = place(offset)?;
         let c = &self.channels[channel];
         Some(match register {
-            0x0 => c.config,
-            0x4 => c.left,
-            0x8 => c.peripheral,
+            CH1_CR => c.config,
+            CH1_NDTR => c.left,
+            CH1_PAR => c.peripheral,
             _ => c.memory,
         })
     }
 
-    fn write(&mut self, offset: u32, write: Write, _: u64) -> Option<()> {
+    fn write(&mut self, offset: u32, write: Write, _: u64) -> Result<(), Why> {
         if offset == IFCR {
             for (index, c) in self.channels.iter_mut().enumerate() {
                 let flags = write.ones() >> (4 * index) & 0xF;
                 c.flags &= !(if flags & 1 != 0 { 0xF } else { flags });
             }
-            return Some(());
+            return Ok(());
         }
-        let (channel, register) = place(offset)?;
+        let (channel, register) = place(offset).ok_or(Why::NoModel)?;
         let c = &mut self.channels[channel];
-        let enabled = c.config & ENABLE != 0;
+        let enabled = ch1_cr::EN.is_in(c.config);
         match register {
-            0x0 => {
-                let next = write.onto(c.config) & 0x7FFF;
-                if next & (MEMORY_TO_MEMORY | FROM_MEMORY) != 0 {
-                    return None;
+            CH1_CR => {
+                let next = write.onto(c.config);
+                let enables = ch1_cr::EN.is_in(next);
+                // Out of memory is not modelled.
+                if ch1_cr::MEM2MEM.is_in(next) || ch1_cr::DIR.is_in(next) {
+                    return Err(Why::NoModel);
                 }
-                if enabled && next & ENABLE != 0 && next != c.config {
-                    self.broken = Some(Rule::DmaEnabled);
-                    return Some(());
+                if enabled && enables && next != c.config {
+                    return Err(Why::Broken(Rule::DmaEnabled));
                 }
-                if next & ENABLE != 0 && !enabled {
+                if enables && !enabled {
                     (c.total, c.done) = (c.left, 0);
                 }
                 c.config = next;
             }
-            _ if enabled => self.broken = Some(Rule::DmaEnabled),
-            0x4 => c.left = write.onto(c.left) & 0xFFFF,
-            0x8 => c.peripheral = write.onto(c.peripheral),
+            _ if enabled => return Err(Why::Broken(Rule::DmaEnabled)),
+            CH1_NDTR => c.left = ch1_ndtr::NDT.of(write.onto(c.left)),
+            CH1_PAR => c.peripheral = write.onto(c.peripheral),
             _ => c.memory = write.onto(c.memory),
         }
-        Some(())
-    }
-
-    fn take_broken_rule(&mut self) -> Option<Rule> {
-        self.broken.take()
+        Ok(())
     }
 }
 
-/// Request of a channel; requests of a synchronisation event, and event generation.
-const REQUEST: u32 = 0x7F;
-const COUNT: u32 = 0x1F << 19 | 1 << 9;
-
-/// The request multiplexer.
-#[derive(Clone, Debug)]
-pub struct Dmamux(Registers);
-
-impl Default for Dmamux {
-    fn default() -> Self {
-        let request = |channel| Kept { offset: 4 * channel, reset: 0, mask: REQUEST | COUNT };
-        // Without synchronisation its flags are zero.
-        Self(Registers::new(
-            &std::array::from_fn::<_, 16, _>(|at| request(at as u32)),
-            &[],
-            &[0x80, 0x84],
-        ))
-    }
+/// The request multiplexer. Synchronisation and event generation are not modelled: the count of
+/// their requests has no effect, their flags are zero.
+pub fn multiplexer() -> Registers {
+    use dmamux::ccr0;
+    let request = bits(&[ccr0::DMAREQ_ID, ccr0::EGE, ccr0::NBREQ]);
+    let channels = (dmamux::CCR0..=dmamux::CCR15).step_by(4).map(|offset| (offset, request));
+    Registers::of(DMAMUX, &[], &channels.collect::<Vec<_>>(), &[dmamux::CSR, dmamux::CFR])
 }
 
-impl Dmamux {
-    /// The request that channel `index` of DMA1 listens to; 0 is none.
-    pub fn request(&self, index: usize) -> u32 {
-        self.0.get(4 * index as u32) & REQUEST
-    }
-}
-
-impl Peripheral for Dmamux {
-    fn read(&mut self, offset: u32, _: u64) -> Option<u32> {
-        self.0.read(offset)
-    }
-
-    fn write(&mut self, offset: u32, write: Write, _: u64) -> Option<()> {
-        // Synchronisation and event generation are not modelled; the count of their requests
-        // has no effect.
-        if offset < 0x40 && write.ones() & !(REQUEST | COUNT) != 0 {
-            return None;
-        }
-        self.0.write(offset, write)
-    }
+/// The request that channel `index` of DMA1 listens to, by the multiplexer; 0 is none.
+pub fn request(multiplexer: &Registers, index: usize) -> u32 {
+    dmamux::ccr0::DMAREQ_ID.of(multiplexer.get(dmamux::CCR0 + 4 * index as u32))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    const ALL: u32 = u32::MAX;
-
-    fn write(dma: &mut Dma, offset: u32, value: u32) {
-        dma.write(offset, Write { value, mask: ALL }, 0).expect("modelled");
-    }
+    use crate::peripherals::tests::write;
 
     /// Channel 3 takes two halfwords from 0x4001_300C into memory.
     fn ready() -> Dma {
         let mut dma = Dma::default();
-        let base = FIRST + 2 * STRIDE;
-        write(&mut dma, base + 4, 2);
-        write(&mut dma, base + 8, 0x4001_300C);
-        write(&mut dma, base + 12, 0x2000_0100);
-        write(&mut dma, base, 1 << 10 | 1 << 8 | STEP_MEMORY | 2 | ENABLE);
+        write(&mut dma, CH3_NDTR, 2, 0);
+        write(&mut dma, CH3_PAR, 0x4001_300C, 0);
+        write(&mut dma, CH3_MAR, 0x2000_0100, 0);
+        let halfwords = ch3_cr::MSIZE.at(1) | ch3_cr::PSIZE.at(1);
+        write(&mut dma, CH3_CR, halfwords | bits(&[ch3_cr::MINC, ch3_cr::TCIE, ch3_cr::EN]), 0);
         dma
     }
 
@@ -245,23 +200,15 @@ mod tests {
         dma.moved(2, true);
         assert!(dma.requests(2));
         assert_eq!(dma.due(2), None);
-        assert_eq!(dma.read(ISR, 0), Some((COMPLETE | HALF | 1) << 8));
-        write(&mut dma, IFCR, 1 << 8);
+        assert_eq!(dma.read(ISR, 0), Some(bits(&[isr::GIF3, isr::TCIF3, isr::HTIF3])));
+        write(&mut dma, IFCR, ifcr::CGIF3.mask, 0);
         assert!(!dma.requests(2));
-    }
-
-    #[test]
-    fn a_running_channel_keeps_its_addresses() {
-        let mut dma = ready();
-        write(&mut dma, FIRST + 2 * STRIDE + 12, 0);
-        assert_eq!(dma.due(2).expect("due").memory.0, 0x2000_0100);
-    }
-
-    #[test]
-    fn a_wrong_address_ends_it_with_an_error() {
+        // A wrong address ends it.
         let mut dma = ready();
         dma.moved(2, false);
-        assert_eq!(dma.read(ISR, 0), Some((ERROR | 1) << 8));
-        assert_eq!(dma.due(2), None);
+        assert_eq!(
+            (dma.due(2), dma.read(CH3_CR, 0).map(|word| ch3_cr::EN.of(word))),
+            (None, Some(0))
+        );
     }
 }

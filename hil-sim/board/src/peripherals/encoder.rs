@@ -1,28 +1,23 @@
 //! A quadrature counter: TIM5.
 
-use super::registers::{Kept, Registers};
+use super::registers::Registers;
 use super::{Peripheral, Write};
+use crate::chip::Why;
+use crate::chip::description::{Field, TIM5, bits, tim2::*};
 
-const CR1: u32 = 0x00;
-const SMCR: u32 = 0x08;
-const SR: u32 = 0x10;
-const EGR: u32 = 0x14;
-const CCMR1: u32 = 0x18;
-const CCER: u32 = 0x20;
-const CNT: u32 = 0x24;
-const ARR: u32 = 0x2C;
-
-const ALL: u32 = u32::MAX;
-/// Mode of the slave controller.
-const MODE: u32 = 7;
-
-const REGISTERS: [Kept; 5] = [
-    Kept { offset: CR1, reset: 0, mask: 0x87 },
-    Kept { offset: SMCR, reset: 0, mask: MODE },
-    Kept { offset: CCMR1, reset: 0, mask: 0xF3F3 },
-    Kept { offset: CCER, reset: 0, mask: 0x33 },
-    Kept { offset: ARR, reset: ALL, mask: ALL },
+/// Registers that the model has in part: two inputs with their filters, and quadrature modes.
+const PARTS: [(u32, u32); 4] = [
+    (CR1, bits(&[cr1::CEN, cr1::UDIS, cr1::URS, cr1::ARPE])),
+    (SMCR, smcr::SMS.mask),
+    (CCMR1_INPUT, bits(&[MAPPED[0], FILTER[0], MAPPED[1], FILTER[1]])),
+    (CCER, bits(&[ccer::CC1E, ccer::CC2E, INVERTED[0], INVERTED[1]])),
 ];
+const FIXED: [u32; 8] = [CR2, DIER, SR, EGR, CCMR2_INPUT, PSC, CCR1, CCR2];
+
+/// Of the two lines: which input the channel looks at, its filter, its polarity.
+const MAPPED: [Field; 2] = [ccmr1_input::CC1S, ccmr1_input::CC2S];
+const FILTER: [Field; 2] = [ccmr1_input::IC1F, ccmr1_input::IC2F];
+const INVERTED: [Field; 2] = [ccer::CC1P, ccer::CC2P];
 
 /// Cycles for which a level has to last to pass an input filter (`ICxF`, `BKF`) with the
 /// timer's clock.
@@ -58,36 +53,29 @@ pub struct Encoder {
 impl Encoder {
     /// After reset, with these levels at its inputs.
     pub fn new(lines: [bool; 2]) -> Self {
-        Self {
-            registers: Registers::new(&REGISTERS, &[CNT], &[0x04, 0x0C, 0x1C, 0x28, 0x34, 0x38]),
-            lines,
-        }
+        Self { registers: Registers::of(TIM5, &[CNT, ARR], &PARTS, &FIXED), lines }
     }
 
     /// The lines take these levels for `cycles`; the filter drops shorter ones.
     pub fn set_lines(&mut self, lines: [bool; 2], cycles: u64) {
         for (line, level) in lines.into_iter().enumerate() {
-            if level != self.lines[line] && cycles >= self.filter(line) {
+            let filter = filter_cycles(self.registers.field(FILTER[line]));
+            if level != self.lines[line] && cycles >= filter {
                 self.lines[line] = level;
                 self.edge(line);
             }
         }
     }
 
-    fn filter(&self, line: usize) -> u64 {
-        filter_cycles(self.registers.get(CCMR1) >> (8 * line + 4))
-    }
-
     fn edge(&mut self, line: usize) {
-        let mode = self.registers.get(SMCR) & MODE;
+        let mode = self.registers.field(smcr::SMS);
         let counts = matches!((mode, line), (1 | 3, 0) | (2 | 3, 1));
         // Each channel has to look at its own input.
-        let mapped = self.registers.get(CCMR1) >> (8 * line) & 3 == 1;
-        if !counts || !mapped || self.registers.get(CR1) & 1 == 0 {
+        let mapped = self.registers.field(MAPPED[line]) == 1;
+        if !counts || !mapped || !self.registers.has(cr1::CEN) {
             return;
         }
-        let inverted = |line: usize| self.registers.get(CCER) >> (4 * line + 1) & 1 != 0;
-        let level = |line: usize| self.lines[line] ^ inverted(line);
+        let level = |line: usize| self.lines[line] ^ self.registers.has(INVERTED[line]);
         // The first line leads when counting up: its edges find the other line at the
         // level that it left, those of the second line at the one that it takes.
         let up = (level(0) == level(1)) == (line == 1);
@@ -104,24 +92,18 @@ impl Encoder {
 
 impl Peripheral for Encoder {
     fn read(&mut self, offset: u32, _: u64) -> Option<u32> {
-        match offset {
-            SR | EGR => Some(0),
-            _ => self.registers.read(offset),
-        }
+        self.registers.read(offset)
     }
 
-    fn write(&mut self, offset: u32, write: Write, _: u64) -> Option<()> {
+    fn write(&mut self, offset: u32, write: Write, _: u64) -> Result<(), Why> {
         match offset {
             // Nothing here raises a flag that could be cleared.
-            SR => Some(()),
-            EGR if write.ones() & !1 == 0 => {
-                if write.ones() & 1 != 0 {
-                    self.registers.set(CNT, 0);
-                }
-                Some(())
+            SR => Ok(()),
+            EGR if write.ones() == egr::UG.mask => {
+                self.registers.set(CNT, 0);
+                Ok(())
             }
-            EGR => None,
-            SMCR if write.ones() & !MODE != 0 || write.ones() & MODE > 3 => None,
+            SMCR if smcr::SMS.of(write.ones()) > 3 => Err(Why::NoModel),
             _ => self.registers.write(offset, write),
         }
     }
@@ -139,8 +121,10 @@ mod tests {
 
     fn ready(mode: u32) -> Encoder {
         let mut encoder = Encoder::new(at(0));
-        for (offset, value) in [(ARR, 0xFFFF), (CCMR1, 0xF1F1), (CCER, 0), (SMCR, mode), (CR1, 1)] {
-            encoder.write(offset, Write { value, mask: ALL }, 0).expect("modelled");
+        for (offset, value) in
+            [(ARR, 0xFFFF), (CCMR1_INPUT, 0xF1F1), (CCER, 0), (SMCR, mode), (CR1, 1)]
+        {
+            encoder.write(offset, Write { value, mask: u32::MAX }, 0).expect("modelled");
         }
         encoder
     }

@@ -17,64 +17,26 @@ mod power;
 #[cfg(test)]
 mod tests;
 
-use super::registers::{Kept, Registers};
+use super::registers::Registers;
 use super::{HZ, Peripheral, Write};
+use crate::chip::Why;
+use crate::chip::description::{FLASH, bits, flash::*};
 
 use ecc::Ecc;
 pub use ecc::Wrong;
 pub use power::Cut;
 
-const ACR: u32 = 0x00;
-const KEYR: u32 = 0x08;
-const SR: u32 = 0x10;
-const CR: u32 = 0x14;
-const ECCR: u32 = 0x18;
-const OPTR: u32 = 0x20;
-
-/// Of the access control register: data cache on, and reset of its content.
-const DATA_CACHE: u32 = 1 << 10;
-const DATA_CACHE_RESET: u32 = 1 << 12;
-/// Of the option register: two banks.
-const DBANK: u32 = 1 << 22;
-
-const LOCK: u32 = 1 << 31;
 const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
 
-/// Of the control register: program, erase a page (with number and bank) or a bank,
-/// start, interrupt at the end and on an error.
-const PROGRAM: u32 = 1;
-const PAGE: u32 = 1 << 1;
-const BANKS: [u32; 2] = [1 << 2, 1 << 15];
-const SECOND_BANK: u32 = 1 << 11;
-const START: u32 = 1 << 16;
-const END_INTERRUPT: u32 = 1 << 24;
-const ERROR_INTERRUPT: u32 = 1 << 25;
-/// Bits that can be written; option bytes, fast programming and the area that can be
-/// secured are not modelled.
-const CONTROL: u32 = PROGRAM
-    | PAGE
-    | BANKS[0]
-    | BANKS[1]
-    | 0x7F << 3
-    | SECOND_BANK
-    | START
-    | END_INTERRUPT
-    | ERROR_INTERRUPT
-    | 1 << 30
-    | LOCK;
-
-/// Of the status register.
-const END: u32 = 1;
-/// The double word is not erased.
-const NOT_ERASED: u32 = 1 << 3;
-/// The second word does not belong to the first, or the first is not the lower one.
-const ALIGNMENT: u32 = 1 << 5;
-/// Written by bytes or halfwords.
-const SIZE: u32 = 1 << 6;
-/// Written without `PG`, or with an error that is not cleared.
-const SEQUENCE: u32 = 1 << 7;
-const ERRORS: u32 = NOT_ERASED | 1 << 4 | ALIGNMENT | SIZE | SEQUENCE | 1 << 1 | 1 << 8 | 1 << 9;
-const BUSY: u32 = 1 << 16;
+/// Erasing of one bank or of both.
+const ERASES_BANKS: u32 = bits(&[cr::MER1, cr::MER2]);
+/// Of the control register: option bytes, fast programming and the area that can be secured are
+/// not modelled.
+const CONTROL: u32 = ERASES_BANKS
+    | bits(&[cr::PG, cr::PER, cr::PNB, cr::BKER, cr::STRT, cr::EOPIE, cr::ERRIE])
+    | bits(&[cr::OPTLOCK, cr::LOCK]);
+const ERRORS: u32 = bits(&[sr::OPERR, sr::PROGERR, sr::WRPERR, sr::PGAERR, sr::SIZERR])
+    | bits(&[sr::PGSERR, sr::MISERR, sr::FASTERR]);
 
 /// First address of the flash, bytes of a bank and of a page.
 const BASE: u32 = 0x0800_0000;
@@ -84,12 +46,6 @@ const PAGE_BYTES: u32 = 2 * 1024;
 /// Source: DS12288, flash memory characteristics.
 const PROGRAM_CYCLES: u64 = 82 * (HZ / 1_000_000);
 const ERASE_CYCLES: u64 = 22 * (HZ / 1000);
-
-/// ACR, and OPTR as delivered.
-const REGISTERS: [Kept; 2] = [
-    Kept { offset: ACR, reset: 0x0004_0600, mask: 0x0004_7F0F },
-    Kept { offset: OPTR, reset: 0xFFEF_F8AA, mask: 0 },
-];
 
 /// Change of the memory by an operation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -125,8 +81,6 @@ pub struct Flash {
     registers: Registers,
     /// Keys accepted; none is accepted after a wrong one until reset.
     keys: Option<usize>,
-    control: u32,
-    flags: u32,
     /// The lower word of a double word, and where.
     first: Option<(u32, u32)>,
     /// A double word whose old content is not known yet.
@@ -139,20 +93,21 @@ pub struct Flash {
     /// An operation has changed what the data cache may hold.
     stale: bool,
     /// Uses of the data cache that corrupt it, resets or not.
-    cache_hazards: u64,
+    pub cache_hazards: u64,
     /// Operations begun so far, resets or not.
-    begun: u64,
+    pub begun: u64,
     cut: Option<Cut>,
     ends: bool,
 }
 
 impl Default for Flash {
     fn default() -> Self {
+        let mut registers = Registers::of(FLASH, &[ACR, SR], &[(CR, CONTROL)], &[OPTR]);
+        // By RM0440, FLASH_ACR; the description has 0.
+        registers.put(acr::DBG_SWEN, 1);
         Self {
-            registers: Registers::new(&REGISTERS, &[], &[]),
+            registers,
             keys: Some(0),
-            control: 0xC000_0000,
-            flags: 0,
             first: None,
             wanted: None,
             operation: None,
@@ -171,10 +126,10 @@ impl Default for Flash {
 impl Flash {
     /// The program writes to the flash's memory.
     pub fn store(&mut self, address: u32, size: u32, value: u32) {
-        let broken = if self.control & PROGRAM == 0 || self.flags & ERRORS != 0 {
-            SEQUENCE
+        let broken = if !self.registers.has(cr::PG) || self.has_failed() {
+            sr::PGSERR
         } else if size != 4 {
-            SIZE
+            sr::SIZERR
         } else {
             match self.first.take() {
                 None if address.is_multiple_of(8) => {
@@ -186,11 +141,16 @@ impl Flash {
                     self.wanted = Some((lower, double.to_le_bytes()));
                     return;
                 }
-                _ => ALIGNMENT,
+                _ => sr::PGAERR,
             }
         };
-        self.flags |= broken;
+        self.registers.put(broken, 1);
         self.first = None;
+    }
+
+    /// Whether an error is flagged.
+    fn has_failed(&self) -> bool {
+        self.registers.get(SR) & ERRORS != 0
     }
 
     /// Address whose content the interface needs.
@@ -203,28 +163,26 @@ impl Flash {
         let Some((address, bytes)) = self.wanted.take() else { return };
         // A double word of zeros overwrites any content.
         if before != [0xFF; 8] && bytes != [0; 8] {
-            self.flags |= NOT_ERASED;
+            self.registers.put(sr::PROGERR, 1);
             return;
         }
         self.begin(Change::Programmed { address, bytes }, before, now + PROGRAM_CYCLES, now);
     }
 
     fn erase(&mut self, now: u64) {
-        let banks = [0, 1].map(|bank| self.control & BANKS[bank] != 0);
-        let page = self.control & PAGE != 0;
-        let both = page && banks != [false; 2] || self.control & PROGRAM != 0;
-        if both || self.flags & ERRORS != 0 || !page && banks == [false; 2] {
-            self.flags |= SEQUENCE;
+        let banks = [cr::MER1, cr::MER2].map(|bank| self.registers.has(bank));
+        let page = self.registers.has(cr::PER);
+        if self.registers.has(cr::PG) || page == (banks != [false; 2]) || self.has_failed() {
+            self.registers.put(sr::PGSERR, 1);
             return;
         }
+        let number = self.registers.field(cr::PNB);
         let (address, size) = match (page, banks) {
             // The bank's bit has no meaning with one bank.
-            (true, _) if self.single_bank => {
-                (BASE + 2 * PAGE_BYTES * (self.control >> 3 & 0x7F), 2 * PAGE_BYTES)
-            }
+            (true, _) if self.single_bank => (BASE + 2 * PAGE_BYTES * number, 2 * PAGE_BYTES),
             (true, _) => {
-                let bank = if self.control & SECOND_BANK != 0 { BANK_BYTES } else { 0 };
-                (BASE + bank + PAGE_BYTES * (self.control >> 3 & 0x7F), PAGE_BYTES)
+                let bank = BANK_BYTES * self.registers.field(cr::BKER);
+                (BASE + bank + PAGE_BYTES * number, PAGE_BYTES)
             }
             (_, [true, true]) => (BASE, 2 * BANK_BYTES),
             (_, [true, _]) => (BASE, BANK_BYTES),
@@ -236,38 +194,33 @@ impl Flash {
     fn begin(&mut self, change: Change, before: [u8; 8], due: u64, now: u64) {
         self.begun += 1;
         self.stale = true;
-        self.cache_hazards += u64::from(self.caches_data());
+        self.cache_hazards += u64::from(self.registers.has(acr::DCEN));
         let due = self.cut_short(due, now);
         self.operation = Some(Operation { change, before, due });
     }
 
-    fn caches_data(&self) -> bool {
-        self.registers.get(ACR) & DATA_CACHE != 0
-    }
-
-    /// Uses of the data cache that corrupt its content on the chip.
-    pub const fn cache_hazards(&self) -> u64 {
-        self.cache_hazards
+    /// Wait states, see [`super::rcc`].
+    pub fn wait_states(&self) -> u32 {
+        self.registers.field(acr::LATENCY)
     }
 
     /// Sets the option byte: one bank of 4 KiB pages, or two as delivered.
     pub fn set_single_bank(&mut self, single: bool) {
         self.single_bank = single;
-        let options = self.registers.get(OPTR) & !DBANK;
-        self.registers.set(OPTR, options | if single { 0 } else { DBANK });
+        self.registers.put(optr::DBANK, (!single).into());
     }
 
-    fn write_access(&mut self, write: Write) -> Option<()> {
-        let before = self.caches_data();
+    fn write_access(&mut self, write: Write) -> Result<(), Why> {
+        let before = self.registers.has(acr::DCEN);
         self.registers.write(ACR, write)?;
         // The content can be reset only while the cache is off.
-        if write.ones() & DATA_CACHE_RESET != 0 && !before {
+        if acr::DCRST.is_in(write.ones()) && !before {
             self.stale = false;
         }
-        if !before && self.caches_data() {
+        if !before && self.registers.has(acr::DCEN) {
             self.cache_hazards += u64::from(self.stale);
         }
-        Some(())
+        Ok(())
     }
 
     /// Takes the change of a finished operation.
@@ -276,62 +229,60 @@ impl Flash {
     }
 
     /// Whether it requests its interrupt.
-    pub const fn requests(&self) -> bool {
-        self.control & END_INTERRUPT != 0 && self.flags & END != 0
-            || self.control & ERROR_INTERRUPT != 0 && self.flags & ERRORS != 0
+    pub fn requests(&self) -> bool {
+        self.registers.has(cr::EOPIE) && self.registers.has(sr::EOP)
+            || self.registers.has(cr::ERRIE) && self.has_failed()
     }
 
     const fn is_busy(&self) -> bool {
         self.operation.is_some() || self.wanted.is_some()
     }
 
-    fn write_control(&mut self, write: Write, now: u64) -> Option<()> {
+    fn write_control(&mut self, write: Write, now: u64) -> Result<(), Why> {
         // Locked or busy, it ignores writes.
-        if self.control & LOCK != 0 || self.is_busy() {
-            return Some(());
+        if self.registers.has(cr::LOCK) || self.is_busy() {
+            return Ok(());
         }
-        if write.ones() & !CONTROL != 0 {
-            return None;
-        }
-        let kept = self.control & (LOCK | 1 << 30);
-        self.control = write.onto(self.control) & !START | kept;
-        if self.control & PROGRAM == 0 {
+        // The locks can be set alone.
+        let locks = write.zeros() & bits(&[cr::LOCK, cr::OPTLOCK]);
+        self.registers.write(CR, Write { mask: write.mask & !locks, ..write })?;
+        self.registers.put(cr::STRT, 0);
+        if !self.registers.has(cr::PG) {
             self.first = None;
         }
-        if write.ones() & START != 0 {
+        if cr::STRT.is_in(write.ones()) {
             self.erase(now);
         }
-        Some(())
+        Ok(())
     }
 }
 
 impl Peripheral for Flash {
     fn read(&mut self, offset: u32, _: u64) -> Option<u32> {
         match offset {
-            SR => Some(self.flags | if self.is_busy() { BUSY } else { 0 }),
-            CR => Some(self.control),
+            SR => Some(self.registers.get(SR) | sr::BSY.at(self.is_busy().into())),
             ECCR => Some(self.ecc.register),
             _ => self.registers.read(offset),
         }
     }
 
-    fn write(&mut self, offset: u32, write: Write, now: u64) -> Option<()> {
+    fn write(&mut self, offset: u32, write: Write, now: u64) -> Result<(), Why> {
         match offset {
             KEYR => {
                 let next = self.keys.and_then(|taken| KEYS.get(taken).map(|key| (taken, *key)));
                 self.keys = next.filter(|(_, key)| *key == write.value).map(|(taken, _)| taken + 1);
                 if self.keys == Some(KEYS.len()) {
-                    self.control &= !LOCK;
+                    self.registers.put(cr::LOCK, 0);
                     self.keys = Some(0);
                 }
             }
-            SR => self.flags &= !write.ones(),
+            SR => self.registers.clear(SR, write.ones()),
             ACR => self.write_access(write)?,
             ECCR => self.ecc.write(write),
             CR => self.write_control(write, now)?,
             _ => self.registers.write(offset, write)?,
         }
-        Some(())
+        Ok(())
     }
 
     fn deadline(&self) -> u64 {
@@ -347,8 +298,8 @@ impl Peripheral for Flash {
             self.operation = None;
             self.written(operation.change);
             self.finished = Some(operation.change);
-            if self.control & END_INTERRUPT != 0 {
-                self.flags |= END;
+            if self.registers.has(cr::EOPIE) {
+                self.registers.put(sr::EOP, 1);
             }
         }
     }

@@ -2,25 +2,14 @@
 //!
 //! Source: RM0440, 9.3 (functions) and 9.4 (registers).
 
-use super::registers::{Kept, Registers};
+use super::registers::Registers;
 use super::{Peripheral, Write};
+use crate::chip::Why;
+use crate::chip::description;
+use crate::chip::description::{GPIOA, GPIOB, GPIOC, GPIOD, GPIOE, GPIOF, GPIOG, gpioc::*};
 
-const MODER: u32 = 0x00;
-const PUPDR: u32 = 0x0C;
-const IDR: u32 = 0x10;
-const ODR: u32 = 0x14;
-const BSRR: u32 = 0x18;
-const AFRL: u32 = 0x20;
-const BRR: u32 = 0x28;
-
-const ALL: u32 = u32::MAX;
-
-/// Everything but input, set and reset; the values after reset are those of ports C to G.
-const REGISTERS: [Kept; 3] = [
-    Kept { offset: MODER, reset: ALL, mask: ALL },
-    Kept { offset: 0x04, reset: 0, mask: 0xFFFF },
-    Kept { offset: ODR, reset: 0, mask: 0xFFFF },
-];
+/// The ports: those with pins of the debug probe have values of their own after reset.
+const PORTS: [description::Peripheral; 7] = [GPIOA, GPIOB, GPIOC, GPIOD, GPIOE, GPIOF, GPIOG];
 
 /// What a pin does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,26 +27,16 @@ pub enum Role {
 #[derive(Clone, Debug)]
 pub struct Gpio {
     registers: Registers,
-    /// What the world outside drives, as pins driven and their levels.
-    driven: u32,
-    levels: u32,
+    /// What the world outside does: pins driven, and their levels.
+    pub outside: (u32, u32),
 }
 
 impl Gpio {
-    /// Port number `port` (0 is A) after reset; `driven` and `levels` say what the world
-    /// outside does with the pins.
-    pub fn new(port: usize, driven: u32, levels: u32) -> Self {
-        let mut registers = Registers::new(&REGISTERS, &[0x08, PUPDR, AFRL, AFRL + 4], &[]);
-        // The pins of the debug probe.
-        let (mode, speed, pull) = match port {
-            0 => (0xABFF_FFFF, 0x0C00_0000, 0x6400_0000),
-            1 => (0xFFFF_FEBF, 0xC0, 0x100),
-            _ => (ALL, 0, 0),
-        };
-        registers.set(MODER, mode);
-        registers.set(0x08, speed);
-        registers.set(PUPDR, pull);
-        Self { registers, driven, levels }
+    /// Port number `port` (0 is A) after reset, with what the world outside does.
+    pub fn new(port: usize, outside: (u32, u32)) -> Self {
+        let whole = [MODER, OTYPER, OSPEEDR, PUPDR, ODR, AFRL, AFRH];
+        let registers = Registers::of(PORTS[port], &whole, &[], &[BSRR, BRR]);
+        Self { registers, outside }
     }
 
     pub fn role(&self, pin: u32) -> Role {
@@ -78,8 +57,9 @@ impl Gpio {
         if self.role(pin) == Role::Output {
             return self.registers.get(ODR) >> pin & 1 != 0;
         }
-        if self.driven >> pin & 1 != 0 {
-            return self.levels >> pin & 1 != 0;
+        let (driven, levels) = self.outside;
+        if driven >> pin & 1 != 0 {
+            return levels >> pin & 1 != 0;
         }
         self.registers.get(PUPDR) >> (2 * pin) & 3 == 1
     }
@@ -92,13 +72,9 @@ impl Gpio {
     /// The world outside drives a pin, or lets go of it.
     pub fn drive(&mut self, pin: u32, level: Option<bool>) {
         let bit = 1 << pin;
-        self.driven = if level.is_some() { self.driven | bit } else { self.driven & !bit };
-        self.levels = if level == Some(true) { self.levels | bit } else { self.levels & !bit };
-    }
-
-    /// What the world outside does: pins driven, and their levels.
-    pub const fn outside(&self) -> (u32, u32) {
-        (self.driven, self.levels)
+        let with = |word: u32, on: bool| if on { word | bit } else { word & !bit };
+        let (driven, levels) = self.outside;
+        self.outside = (with(driven, level.is_some()), with(levels, level == Some(true)));
     }
 }
 
@@ -109,12 +85,11 @@ impl Peripheral for Gpio {
                 let high = |pin: &u32| self.role(*pin) != Role::Analog && self.level(*pin);
                 Some((0..16).filter(high).fold(0, |word, pin| word | 1 << pin))
             }
-            BSRR | BRR => Some(0),
             _ => self.registers.read(offset),
         }
     }
 
-    fn write(&mut self, offset: u32, write: Write, _: u64) -> Option<()> {
+    fn write(&mut self, offset: u32, write: Write, _: u64) -> Result<(), Why> {
         let ones = write.ones();
         let old = self.registers.get(ODR);
         match offset {
@@ -123,37 +98,20 @@ impl Peripheral for Gpio {
             BRR => self.registers.set(ODR, old & !ones),
             _ => return self.registers.write(offset, write),
         }
-        Some(())
+        Ok(())
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn write(port: &mut Gpio, offset: u32, value: u32) {
-        port.write(offset, Write { value, mask: ALL }, 0).expect("modelled");
-    }
-
-    #[test]
-    fn an_output_shows_what_was_set_and_setting_goes_first() {
-        let mut port = Gpio::new(2, 0, 0);
-        write(&mut port, MODER, 0b01 << 6);
-        write(&mut port, BSRR, 1 << 3);
-        assert!(port.puts_out(3));
-        write(&mut port, BSRR, 1 << 19);
-        assert!(!port.puts_out(3));
-        write(&mut port, BSRR, 1 << 3 | 1 << 19);
-        assert!(port.puts_out(3));
-        write(&mut port, BRR, 1 << 3);
-        assert!(!port.puts_out(3));
-    }
+    use crate::peripherals::tests::write;
 
     #[test]
     fn an_input_shows_the_world_or_else_its_pull_resistor() {
-        let mut port = Gpio::new(2, 0, 0);
-        write(&mut port, MODER, 0);
-        write(&mut port, PUPDR, 0b01 << 8);
+        let mut port = Gpio::new(2, (0, 0));
+        write(&mut port, MODER, 0, 0);
+        write(&mut port, PUPDR, 0b01 << 8, 0);
         assert_eq!(port.read(IDR, 0), Some(1 << 4));
         port.drive(4, Some(false));
         port.drive(5, Some(true));
@@ -161,14 +119,5 @@ mod tests {
         port.drive(4, None);
         port.drive(5, None);
         assert_eq!(port.read(IDR, 0), Some(1 << 4));
-    }
-
-    #[test]
-    fn the_alternate_function_is_told() {
-        let mut port = Gpio::new(0, 0, 0);
-        write(&mut port, MODER, 0b10 << 18);
-        write(&mut port, AFRL + 4, 6 << 4);
-        assert_eq!(port.role(9), Role::Alternate(6));
-        assert_eq!(port.role(8), Role::Input);
     }
 }

@@ -1,12 +1,9 @@
 //! The independent watchdog, on its own oscillator of 32 kHz.
 
+use super::registers::Registers;
 use super::{HZ, Peripheral, Write};
-
-const KR: u32 = 0x00;
-const PR: u32 = 0x04;
-const RLR: u32 = 0x08;
-const SR: u32 = 0x0C;
-const WINR: u32 = 0x10;
+use crate::chip::Why;
+use crate::chip::description::{IWDG, bits, iwdg::*};
 
 /// Nominal frequency of its oscillator, Hz.
 pub const LSI_HZ: u64 = 32_000;
@@ -17,7 +14,7 @@ pub const LSI_RANGE_HZ: [u64; 2] = [29_500, 34_000];
 const UPDATE: u64 = 5;
 
 /// Of the status: an update of prescaler and reload value is in progress.
-const UPDATING: u32 = 3;
+const UPDATING: u32 = bits(&[sr::PVU, sr::RVU]);
 
 /// Prescaler and reload value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,28 +39,27 @@ impl Time {
 /// Once started it counts down from the reset value; what was written to prescaler and reload
 /// register acts from the first refresh on that follows the update. An update takes periods of
 /// the oscillator, which runs only after the start.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug)]
 pub struct Iwdg {
-    written: Time,
+    registers: Registers,
     acting: Time,
     /// Cycle at which what was written acts.
     updated: u64,
-    window: u32,
     open: bool,
     /// Cycle at which it expires, once started.
     expires: u64,
-    started: bool,
-    /// Frequency of its oscillator, Hz.
-    lsi_hz: u64,
+    pub started: bool,
+    /// Frequency of its oscillator, Hz; to be set before it is started.
+    pub lsi_hz: u64,
 }
 
 impl Default for Iwdg {
     fn default() -> Self {
         Self {
-            written: Time::RESET,
+            // A window that forbids early refreshes is not modelled.
+            registers: Registers::of(IWDG, &[PR, RLR], &[], &[KR, WINR]),
             acting: Time::RESET,
             updated: 0,
-            window: 0xFFF,
             open: false,
             expires: u64::MAX,
             started: false,
@@ -73,11 +69,6 @@ impl Default for Iwdg {
 }
 
 impl Iwdg {
-    /// Sets the frequency of its oscillator, Hz, before it is started.
-    pub const fn set_oscillator(&mut self, lsi_hz: u64) {
-        self.lsi_hz = lsi_hz;
-    }
-
     /// After a reset of the chip: as it came up, with the same oscillator.
     pub fn after_reset(&self) -> Self {
         Self { lsi_hz: self.lsi_hz, ..Self::default() }
@@ -94,11 +85,6 @@ impl Iwdg {
         self.updated = self.updated.saturating_add(cycles);
     }
 
-    /// Whether it counts.
-    pub const fn is_started(&self) -> bool {
-        self.started
-    }
-
     pub const fn has_expired(&self, now: u64) -> bool {
         self.expires <= now
     }
@@ -113,7 +99,7 @@ impl Iwdg {
     /// An update that is over acts.
     fn settle(&mut self, now: u64) {
         if self.started && self.updated <= now {
-            self.acting = self.written;
+            self.acting = self.written();
         }
     }
 
@@ -125,33 +111,28 @@ impl Iwdg {
         }
     }
 
-    fn set(&mut self, written: Time, now: u64) {
-        self.settle(now);
-        self.written = written;
-        self.updated = now + UPDATE * HZ / self.lsi_hz;
+    fn written(&self) -> Time {
+        let field = |field| self.registers.field(field);
+        Time { prescaler: field(pr::PR), reload: field(rlr::RL) }
     }
 
     fn updates(&self, now: u64) -> bool {
-        self.written != self.acting && !(self.started && self.updated <= now)
+        self.written() != self.acting && !(self.started && self.updated <= now)
     }
 }
 
 impl Peripheral for Iwdg {
     fn read(&mut self, offset: u32, now: u64) -> Option<u32> {
         match offset {
-            KR => Some(0),
             SR => Some(if self.updates(now) { UPDATING } else { 0 }),
-            PR => Some(self.written.prescaler),
-            RLR => Some(self.written.reload),
-            WINR => Some(self.window),
-            _ => None,
+            _ => self.registers.read(offset),
         }
     }
 
-    fn write(&mut self, offset: u32, write: Write, now: u64) -> Option<()> {
-        let written = self.written;
-        match (offset, write.value & 0xFFFF) {
-            (KR, key) => {
+    fn write(&mut self, offset: u32, write: Write, now: u64) -> Result<(), Why> {
+        match offset {
+            KR => {
+                let key = kr::KEY.of(write.value);
                 self.open = key == 0x5555;
                 match key {
                     0xAAAA => self.refresh(now),
@@ -159,15 +140,19 @@ impl Peripheral for Iwdg {
                     _ => {}
                 }
             }
-            (PR, value) if self.open => self.set(Time { prescaler: value & 7, ..written }, now),
-            (RLR, value) if self.open => self.set(Time { reload: value & 0xFFF, ..written }, now),
-            // A window that forbids early refreshes is not modelled.
-            (WINR, value) if value & 0xFFF != 0xFFF => return None,
-            (WINR, _) => self.refresh(now),
-            (PR | RLR, _) => {}
-            _ => return None,
+            PR | RLR if self.open => {
+                self.settle(now);
+                self.registers.write(offset, write)?;
+                self.updated = now + UPDATE * HZ / self.lsi_hz;
+            }
+            PR | RLR => {}
+            WINR => {
+                self.registers.write(offset, write)?;
+                self.refresh(now);
+            }
+            _ => return Err(Why::NoModel),
         }
-        Some(())
+        Ok(())
     }
 
     fn deadline(&self) -> u64 {
@@ -178,10 +163,7 @@ impl Peripheral for Iwdg {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn write(dog: &mut Iwdg, offset: u32, value: u32, now: u64) {
-        dog.write(offset, Write { value, mask: u32::MAX }, now).expect("modelled");
-    }
+    use crate::peripherals::tests::write;
 
     #[test]
     fn it_expires_after_its_time_unless_it_is_refreshed() {

@@ -4,58 +4,29 @@
 //! function.
 
 use super::encoder::filter_cycles;
-use super::registers::{Kept, Registers};
+use super::registers::Registers;
 use super::{Peripheral, Write};
+use crate::chip::Why;
+use crate::chip::description::{TIM1, bits, tim1::*};
 
-const CR1: u32 = 0x00;
-const SR: u32 = 0x10;
-const EGR: u32 = 0x14;
-const CCMR1: u32 = 0x18;
-const CCER: u32 = 0x20;
-const CNT: u32 = 0x24;
-const PSC: u32 = 0x28;
-const ARR: u32 = 0x2C;
-const RCR: u32 = 0x30;
-const CCR1: u32 = 0x34;
-const BDTR: u32 = 0x44;
-const AF1: u32 = 0x60;
-
-const ENABLE: u32 = 1;
-/// The next update event stops the counter.
-const ONE_PULSE: u32 = 1 << 3;
-/// Counting up, edge-aligned.
-const PLAIN: u32 = ENABLE | 1 << 1 | 1 << 2 | ONE_PULSE | 1 << 7;
-const MOE: u32 = 1 << 15;
-const BREAK_ENABLE: u32 = 1 << 12;
-const BREAK_HIGH: u32 = 1 << 13;
-/// Of `SR`: a break by the pin, and one by the chip itself. The outputs stay off until the latter
-/// is cleared, which is possible only once its cause has gone.
-const BREAK_FLAG: u32 = 1 << 7;
-const SYSTEM_BREAK_FLAG: u32 = 1 << 13;
-
-const REGISTERS: [Kept; 15] = [
-    Kept { offset: CR1, reset: 0, mask: PLAIN | 0x300 },
-    Kept { offset: 0x04, reset: 0, mask: 0x7F77 },
-    Kept { offset: CCMR1, reset: 0, mask: 0x0101_FFFF },
-    Kept { offset: CCMR1 + 4, reset: 0, mask: 0x0101_FFFF },
-    Kept { offset: CCER, reset: 0, mask: 0x33_FFFF },
-    Kept { offset: PSC, reset: 0, mask: 0xFFFF },
-    Kept { offset: ARR, reset: 0xFFFF, mask: 0xFFFF },
-    Kept { offset: RCR, reset: 0, mask: 0xFFFF },
-    Kept { offset: CCR1, reset: 0, mask: 0xFFFF },
-    Kept { offset: CCR1 + 4, reset: 0, mask: 0xFFFF },
-    Kept { offset: CCR1 + 8, reset: 0, mask: 0xFFFF },
-    Kept { offset: CCR1 + 12, reset: 0, mask: 0xFFFF },
-    Kept { offset: BDTR, reset: 0, mask: 0x0FFF_FCFF },
-    Kept { offset: AF1, reset: 1, mask: 0x201 },
-    Kept { offset: 0x64, reset: 1, mask: 0x201 },
+/// Registers that the model has in part: counting up and edge-aligned, compares without dithering,
+/// a break input from the pin alone, no lock.
+const PARTS: [(u32, u32); 9] = [
+    (CR1, bits(&[cr1::CEN, cr1::UDIS, cr1::URS, cr1::OPM, cr1::ARPE, cr1::CKD])),
+    (ARR, 0xFFFF),
+    (CCR1, 0xFFFF),
+    (CCR2, 0xFFFF),
+    (CCR3, 0xFFFF),
+    (CCR4, 0xFFFF),
+    (BDTR, !bits(&[bdtr::LOCK, bdtr::BKBID, bdtr::BK2ID])),
+    (AF1, bits(&[af1::BKINE, af1::BKINP])),
+    (AF2, bits(&[af2::BKINE, af2::BK2INP])),
 ];
 
 /// The timer.
 #[derive(Clone, Debug)]
 pub struct Pwm {
     registers: Registers,
-    flags: u32,
     /// Cycle at which the counter was zero and the repetition counter at `repeats`, while it runs.
     origin: u64,
     /// Value of the counter while it does not.
@@ -83,9 +54,13 @@ pub struct Pwm {
 impl Pwm {
     /// After reset, with this level at the break input.
     pub fn new(pin: bool) -> Self {
+        let whole = [SR, CCMR1_OUTPUT, CCMR2_OUTPUT, CCER, PSC, RCR];
+        let mut registers = Registers::of(TIM1, &whole, &PARTS, &[CR2, SMCR, DIER, EGR]);
+        // By RM0440, TIMx_AFx; the description has 0.
+        registers.put(af1::BKINE, 1);
+        registers.put(af2::BKINE, 1);
         Self {
-            registers: Registers::new(&REGISTERS, &[], &[0x08, 0x0C]),
-            flags: 0,
+            registers,
             origin: 0,
             stopped: 0,
             prescaler: 1,
@@ -103,7 +78,7 @@ impl Pwm {
     }
 
     fn runs(&self) -> bool {
-        self.registers.get(CR1) & ENABLE != 0
+        self.registers.has(cr1::CEN)
     }
 
     fn counter(&self, now: u64) -> u64 {
@@ -112,9 +87,8 @@ impl Pwm {
 
     /// Cycles up to `now` for which channel 1 was high at its pin.
     pub fn high(&self, now: u64) -> u64 {
-        let enable = self.registers.get(CCER);
         let passed = now.saturating_sub(self.since);
-        if self.frozen || self.registers.get(BDTR) & MOE == 0 || enable & 1 == 0 {
+        if self.frozen || !self.registers.has(bdtr::MOE) || !self.registers.has(ccer::CC1E) {
             return self.high;
         }
         // Cycles of a period, and of its first part.
@@ -131,14 +105,15 @@ impl Pwm {
         } else {
             0
         };
-        let word = self.registers.get(CCMR1);
-        let active = match word >> 4 & 7 | word >> 13 & 8 {
+        let mode =
+            [ccmr1_output::OC1M, ccmr1_output::OC1M_3].map(|part| self.registers.field(part));
+        let active = match mode[0] | mode[1] << 3 {
             5 => passed,
             6 => in_first,
             7 => passed - in_first,
             _ => 0,
         };
-        self.high + if enable & 2 == 0 { active } else { passed - active }
+        self.high + if !self.registers.has(ccer::CC1P) { active } else { passed - active }
     }
 
     /// Books the output up to `now`, before something changes.
@@ -167,14 +142,12 @@ impl Pwm {
     }
 
     fn is_break_active(&self) -> bool {
-        let (bdtr, af) = (self.registers.get(BDTR), self.registers.get(AF1));
-        let inverted = af >> 9 & 1 != 0;
-        let pin = af & 1 != 0 && (self.pin ^ inverted) == (bdtr & BREAK_HIGH != 0);
-        bdtr & BREAK_ENABLE != 0 && pin
+        let active = self.pin ^ self.registers.has(af1::BKINP) == self.registers.has(bdtr::BKP);
+        self.registers.has(bdtr::BKE) && self.registers.has(af1::BKINE) && active
     }
 
     fn is_system_break(&self) -> bool {
-        self.registers.get(BDTR) & BREAK_ENABLE != 0 && self.system
+        self.registers.has(bdtr::BKE) && self.system
     }
 
     /// Starts or ends the wait for the filter.
@@ -182,7 +155,7 @@ impl Pwm {
         if self.is_system_break() {
             self.breaks = self.breaks.min(now);
         } else if self.is_break_active() {
-            let filter = filter_cycles(self.registers.get(BDTR) >> 16);
+            let filter = filter_cycles(self.registers.field(bdtr::BKF));
             self.breaks = self.breaks.min(now + filter);
         } else {
             self.breaks = u64::MAX;
@@ -196,9 +169,8 @@ impl Pwm {
         self.compare = self.registers.get(CCR1).into();
         self.repeats = self.registers.get(RCR).into();
         (self.origin, self.stopped, self.update) = (now, 0, u64::MAX);
-        let control = self.registers.get(CR1);
-        if control & ONE_PULSE != 0 {
-            self.registers.set(CR1, control & !ENABLE);
+        if self.registers.has(cr1::OPM) {
+            self.registers.put(cr1::CEN, 0);
         }
     }
 
@@ -216,8 +188,8 @@ impl Pwm {
     fn renew(&mut self, offset: u32, now: u64) {
         let value = u64::from(self.registers.get(offset));
         match offset {
-            ARR if self.registers.get(CR1) >> 7 & 1 == 0 => self.period = value + 1,
-            CCR1 if self.registers.get(CCMR1) >> 3 & 1 == 0 => self.compare = value,
+            ARR if !self.registers.has(cr1::ARPE) => self.period = value + 1,
+            CCR1 if !self.registers.has(ccmr1_output::OC1PE) => self.compare = value,
             _ => self.await_update(now),
         }
     }
@@ -226,27 +198,25 @@ impl Pwm {
 impl Peripheral for Pwm {
     fn read(&mut self, offset: u32, now: u64) -> Option<u32> {
         match offset {
-            SR => Some(self.flags),
-            EGR => Some(0),
             CNT => Some(self.counter(now) as u32),
             _ => self.registers.read(offset),
         }
     }
 
-    fn write(&mut self, offset: u32, write: Write, now: u64) -> Option<()> {
+    fn write(&mut self, offset: u32, write: Write, now: u64) -> Result<(), Why> {
         self.advance(now);
         match offset {
             SR => {
-                let kept = if self.is_system_break() { SYSTEM_BREAK_FLAG } else { 0 };
-                self.flags &= !(write.mask & !write.value & !kept);
+                // It can be cleared only once its cause has gone.
+                let kept = if self.is_system_break() { sr::SBIF.mask } else { 0 };
+                self.registers.clear(SR, write.zeros() & !kept);
             }
             CNT => {
                 self.stopped = write.value.into();
                 self.origin = now.wrapping_sub(self.stopped * self.prescaler);
             }
-            EGR if write.ones() == 1 => self.load(now),
-            EGR if write.ones() == 0 => {}
-            CR1 if write.ones() & !(PLAIN | 0x300) == 0 => {
+            EGR if write.ones() == egr::UG.mask => self.load(now),
+            CR1 => {
                 let (ran, counter) = (self.runs(), self.counter(now));
                 self.registers.write(CR1, write)?;
                 match (ran, self.runs()) {
@@ -256,16 +226,14 @@ impl Peripheral for Pwm {
                 }
                 self.await_update(now);
             }
-            EGR | CR1 => return None,
             BDTR => {
-                let held = self.registers.get(BDTR) & MOE;
+                let were_on = self.registers.has(bdtr::MOE);
                 self.registers.write(BDTR, write)?;
                 let broken = self.is_break_active() && self.breaks <= now;
-                let flagged = self.flags & SYSTEM_BREAK_FLAG != 0;
-                let active = flagged || self.is_system_break() || broken;
-                if active && held == 0 {
-                    // While the break is active the outputs stay off.
-                    self.registers.set(BDTR, self.registers.get(BDTR) & !MOE);
+                let active = self.registers.has(sr::SBIF) || self.is_system_break() || broken;
+                if active && !were_on {
+                    // While the break is active, or the chip's own is flagged, the outputs stay off.
+                    self.registers.put(bdtr::MOE, 0);
                 }
                 self.rearm(now);
             }
@@ -279,12 +247,11 @@ impl Peripheral for Pwm {
             }
             _ => self.registers.write(offset, write)?,
         }
-        Some(())
+        Ok(())
     }
 
     fn deadline(&self) -> u64 {
-        let trips = self.registers.get(BDTR) & MOE != 0;
-        self.update.min(if trips { self.breaks } else { u64::MAX })
+        self.update.min(if self.registers.has(bdtr::MOE) { self.breaks } else { u64::MAX })
     }
 
     fn advance(&mut self, now: u64) {
@@ -295,11 +262,13 @@ impl Peripheral for Pwm {
         }
         self.book(now);
         if self.is_system_break() {
-            self.flags |= SYSTEM_BREAK_FLAG;
+            self.registers.put(sr::SBIF, 1);
         }
-        if self.breaks <= now && self.registers.get(BDTR) & MOE != 0 {
-            self.registers.set(BDTR, self.registers.get(BDTR) & !MOE);
-            self.flags |= if self.is_system_break() { 0 } else { BREAK_FLAG };
+        if self.breaks <= now && self.registers.has(bdtr::MOE) {
+            self.registers.put(bdtr::MOE, 0);
+            if !self.is_system_break() {
+                self.registers.put(sr::BIF, 1);
+            }
         }
     }
 }
@@ -307,25 +276,23 @@ impl Peripheral for Pwm {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::peripherals::tests::write;
 
     const PERIOD: u64 = 8500;
-
-    fn write(timer: &mut Pwm, offset: u32, value: u32, now: u64) {
-        timer.write(offset, Write { value, mask: u32::MAX }, now).expect("modelled");
-    }
+    const PULSE: u32 = bits(&[cr1::ARPE, cr1::OPM]);
 
     fn moe(timer: &mut Pwm) -> bool {
-        timer.read(BDTR, 0).is_some_and(|value| value & MOE != 0)
+        timer.read(BDTR, 0).is_some_and(|word| bdtr::MOE.is_in(word))
     }
 
     /// 20 kHz on channel 1 from cycle 0 on, break armed, emergency stop closed.
     fn running() -> Pwm {
         let mut timer = Pwm::new(false);
         write(&mut timer, ARR, PERIOD as u32 - 1, 0);
-        write(&mut timer, CCMR1, 0x68, 0);
+        write(&mut timer, CCMR1_OUTPUT, 0x68, 0);
         write(&mut timer, CCER, 1, 0);
         write(&mut timer, EGR, 1, 0);
-        write(&mut timer, CR1, ENABLE | 1 << 7, 0);
+        write(&mut timer, CR1, bits(&[cr1::CEN, cr1::ARPE]), 0);
         write(&mut timer, BDTR, 0xFB400, 0);
         timer
     }
@@ -345,12 +312,12 @@ mod tests {
     /// One pulse of 50 periods at a duty of three quarters in this PWM mode, begun at cycle 0.
     fn pulse(mode: u32) -> Pwm {
         let mut timer = running();
-        write(&mut timer, CCMR1, mode << 4 | 8, 0);
+        write(&mut timer, CCMR1_OUTPUT, mode << 4 | 8, 0);
         write(&mut timer, CCR1, 2125, 0);
         write(&mut timer, RCR, 49, 0);
-        write(&mut timer, CR1, 1 << 7 | ONE_PULSE, 0);
+        write(&mut timer, CR1, PULSE, 0);
         write(&mut timer, EGR, 1, 0);
-        write(&mut timer, CR1, 1 << 7 | ONE_PULSE | ENABLE, 0);
+        write(&mut timer, CR1, PULSE | cr1::CEN.mask, 0);
         timer
     }
 
@@ -362,7 +329,7 @@ mod tests {
             let mut timer = pulse(mode);
             assert_eq!(timer.deadline(), end);
             timer.advance(end);
-            assert_eq!(timer.read(CR1, end).map(|word| word & ENABLE), Some(0), "{mode}");
+            assert_eq!(timer.read(CR1, end).map(|word| cr1::CEN.of(word)), Some(0), "{mode}");
             assert_eq!((timer.read(CNT, end + 9), timer.high(end)), (Some(0), high), "{mode}");
             assert_eq!(timer.high(end + 1000), high + after, "{mode}");
         }
@@ -373,8 +340,12 @@ mod tests {
         let mut timer = pulse(7);
         let again = 20 * PERIOD + 1000;
         write(&mut timer, EGR, 1, again);
-        assert_eq!(timer.read(CR1, again).map(|word| word & ENABLE), Some(0), "an update ends it");
-        write(&mut timer, CR1, 1 << 7 | ONE_PULSE | ENABLE, again);
+        assert_eq!(
+            timer.read(CR1, again).map(|word| cr1::CEN.of(word)),
+            Some(0),
+            "an update ends it"
+        );
+        write(&mut timer, CR1, PULSE | cr1::CEN.mask, again);
         assert_eq!(timer.deadline(), again + 50 * PERIOD);
         assert_eq!(timer.high(again + PERIOD), 21 * 6375);
     }
@@ -384,12 +355,13 @@ mod tests {
         let mut timer = running();
         timer.set_system_break(true, 500);
         timer.advance(500);
+        assert!(!moe(&mut timer));
         write(&mut timer, SR, 0, 600);
-        assert_eq!(timer.read(SR, 600), Some(SYSTEM_BREAK_FLAG), "its cause is still there");
+        assert_eq!(timer.read(SR, 600), Some(sr::SBIF.mask), "its cause is still there");
         timer.set_system_break(false, 700);
         write(&mut timer, BDTR, 0xFB400, 800);
         assert!(!moe(&mut timer), "flagged");
-        write(&mut timer, SR, !SYSTEM_BREAK_FLAG, 900);
+        write(&mut timer, SR, !sr::SBIF.mask, 900);
         write(&mut timer, BDTR, 0xFB400, 1000);
         assert!(moe(&mut timer));
     }
@@ -398,12 +370,16 @@ mod tests {
     fn an_open_emergency_stop_disables_the_outputs_until_they_are_enabled_again() {
         let mut timer = running();
         timer.advance(PERIOD);
+        timer.set_break(true, 9_000);
+        timer.set_break(false, 9_200);
+        timer.advance(9_900);
+        assert!(moe(&mut timer), "a bounce");
         timer.set_break(true, 10_000);
         timer.advance(10_255);
         assert!(moe(&mut timer), "shorter than the filter");
         timer.advance(10_256);
         assert!(!moe(&mut timer));
-        assert_eq!(timer.read(SR, 0), Some(BREAK_FLAG));
+        assert_eq!(timer.read(SR, 0), Some(sr::BIF.mask));
         write(&mut timer, BDTR, 0xFB400, 10_300);
         assert!(!moe(&mut timer), "still open");
         timer.set_break(false, 20_000);
@@ -411,22 +387,5 @@ mod tests {
         assert!(!moe(&mut timer), "closing gives nothing back");
         write(&mut timer, BDTR, 0xFB400, 40_000);
         assert!(moe(&mut timer));
-    }
-
-    #[test]
-    fn a_bounce_does_not_stop_it() {
-        let mut timer = running();
-        timer.set_break(true, 10_000);
-        timer.set_break(false, 10_200);
-        timer.advance(11_000);
-        assert!(moe(&mut timer));
-    }
-
-    #[test]
-    fn a_locked_up_core_stops_it() {
-        let mut timer = running();
-        timer.set_system_break(true, 500);
-        timer.advance(500);
-        assert!(!moe(&mut timer));
     }
 }

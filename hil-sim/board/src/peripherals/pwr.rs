@@ -6,35 +6,17 @@
 //!
 //! Source: RM0440, 6.2.2 (programmable voltage detector) and 6.4 (registers).
 
-use super::registers::{Kept, Registers};
+use super::registers::Registers;
 use super::{HZ, Peripheral, Write};
-
-/// `CR2`, with the detector's settings.
-pub(crate) const CR2: u32 = 0x04;
-const SR2: u32 = 0x14;
-/// `CR5`.
-pub(crate) const CR5: u32 = 0x80;
-/// Of CR5: without the boost of range 1.
-pub(crate) const R1MODE: u32 = 1 << 8;
-
-/// Of CR2: the detector is on.
-const DETECTS: u32 = 1;
-/// Of SR2: the supply is below the threshold.
-const IS_LOW: u32 = 1 << 11;
+use crate::chip::Why;
+use crate::chip::description::{PWR, pwr::*};
 
 /// Least core cycles for which the board's capacitors supply the chip between the detector's
 /// threshold and the reset: a requirement of the wiring.
 pub const HOLDS: u64 = HZ / 1000;
 
-/// CR1 to CR4, CR5 (with the boost of the main regulator), and the status registers,
-/// which report no change in progress. Pull-ups in standby are not used.
-const REGISTERS: [Kept; 5] = [
-    Kept { offset: 0x00, reset: 0x200, mask: 0x470F },
-    Kept { offset: CR2, reset: 0, mask: 0xFFFF },
-    Kept { offset: 0x08, reset: 0x8000, mask: 0xFFFF },
-    Kept { offset: 0x0C, reset: 0, mask: 0xFFFF },
-    Kept { offset: CR5, reset: R1MODE, mask: R1MODE },
-];
+/// The status registers report no change in progress. Pull-ups in standby are not used.
+const WHOLE: [u32; 7] = [CR1, CR2, CR3, CR4, SR1, SR2, CR5];
 
 /// What follows when the supply has been below the threshold.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -55,7 +37,7 @@ pub struct Pwr {
 
 impl Default for Pwr {
     fn default() -> Self {
-        Self { registers: Registers::new(&REGISTERS, &[], &[0x10, SR2]), low: None }
+        Self { registers: Registers::of(PWR, &WHOLE, &[], &[]), low: None }
     }
 }
 
@@ -67,7 +49,12 @@ impl Pwr {
 
     /// Output of the detector: it is on and the supply is low.
     pub fn signals_low(&self) -> bool {
-        self.low.is_some() && self.registers.get(CR2) & DETECTS != 0
+        self.low.is_some() && self.registers.has(cr2::PVDE)
+    }
+
+    /// Whether the main regulator boosts range 1.
+    pub fn boosts(&self) -> bool {
+        !self.registers.has(cr5::R1MODE)
     }
 
     /// Whether power is lost.
@@ -85,10 +72,10 @@ impl Pwr {
 impl Peripheral for Pwr {
     fn read(&mut self, offset: u32, _: u64) -> Option<u32> {
         let kept = self.registers.read(offset)?;
-        Some(if offset == SR2 && self.signals_low() { kept | IS_LOW } else { kept })
+        Some(if offset == SR2 && self.signals_low() { kept | sr2::PVDO.mask } else { kept })
     }
 
-    fn write(&mut self, offset: u32, write: Write, _: u64) -> Option<()> {
+    fn write(&mut self, offset: u32, write: Write, _: u64) -> Result<(), Why> {
         self.registers.write(offset, write)
     }
 
@@ -112,9 +99,9 @@ mod tests {
         let mut power = Pwr::default();
         power.fall(100, Then::Back);
         assert_eq!(power.read(SR2, 0), Some(0));
-        power.write(CR2, Write { value: DETECTS, mask: u32::MAX }, 0).expect("modelled");
+        power.write(CR2, Write { value: cr2::PVDE.mask, mask: u32::MAX }, 0).expect("modelled");
         assert!(power.signals_low());
-        assert_eq!((power.read(SR2, 0), power.deadline()), (Some(IS_LOW), 100));
+        assert_eq!((power.read(SR2, 0), power.deadline()), (Some(sr2::PVDO.mask), 100));
         power.advance(100);
         assert!(!power.signals_low() && !power.is_gone(100));
     }

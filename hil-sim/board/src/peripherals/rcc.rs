@@ -7,36 +7,21 @@
 //! Source: RM0440, 7.2 (clocks) and 7.4 (registers); times: DS12288, clock source
 //! characteristics.
 
-use super::registers::{Kept, Registers};
+use super::registers::Registers;
 use super::{HZ, Peripheral, Write};
+use crate::chip::Why;
+use crate::chip::description::{Field, RCC, bits, rcc::*};
 use crate::rules::Rule;
 
-const CR: u32 = 0x00;
-/// `CFGR`, which selects the system clock.
-pub(crate) const CFGR: u32 = 0x08;
-const PLLCFGR: u32 = 0x0C;
-const BDCR: u32 = 0x90;
-const CSR: u32 = 0x94;
-const CRRCR: u32 = 0x98;
-
-const ALL: u32 = u32::MAX;
-
-const fn kept(offset: u32, reset: u32) -> Kept {
-    Kept { offset, reset, mask: ALL }
-}
-
-/// CIER; resets of the buses; clock enables that are zero after reset; CCIPR, CCIPR2.
-const WORDS: [u32; 13] =
-    [0x18, 0x28, 0x2C, 0x30, 0x38, 0x3C, 0x40, 0x4C, 0x50, 0x5C, 0x60, 0x88, 0x9C];
-/// Register, bit that starts a source of clock, bit that reports it ready, longest time that it
-/// takes, us: HSI, HSE (typical; a crystal), PLL, LSE (typical), LSI, HSI48.
-const SOURCES: [(u32, u32, u32, u64); 6] = [
-    (CR, 1 << 8, 1 << 10, 2),
-    (CR, 1 << 16, 1 << 17, 2_000),
-    (CR, 1 << 24, 1 << 25, 40),
-    (BDCR, 1, 1 << 1, 2_000_000),
-    (CSR, 1, 1 << 1, 130),
-    (CRRCR, 1, 1 << 1, 6),
+/// What starts a source of clock, what reports it ready, longest time that it takes, us; of HSE (a
+/// crystal) and LSE the typical one.
+const SOURCES: [(Field, Field, u64); 6] = [
+    (cr::HSION, cr::HSIRDY, 2),
+    (cr::HSEON, cr::HSERDY, 2_000),
+    (cr::PLLON, cr::PLLRDY, 40),
+    (bdcr::LSEON, bdcr::LSERDY, 2_000_000),
+    (csr::LSION, csr::LSIRDY, 130),
+    (crrcr::HSI48ON, crrcr::HSI48RDY, 6),
 ];
 
 /// Values of `SW` and the sources that they select: HSI, HSE, PLL.
@@ -47,27 +32,6 @@ const OSCILLATORS: [u64; 2] = [16_000_000, 24_000_000];
 
 /// Most MHz for 0 to 4 wait states, without and with the boost of range 1. Source: RM0440, 3.3.3.
 const WAIT_STATES: [[u64; 5]; 2] = [[30, 60, 90, 120, 150], [34, 68, 102, 136, 170]];
-
-/// Flags of ready clocks: none requests an interrupt.
-const READY: [u32; 2] = [0x1C, 0x20];
-/// CR, ICSCR, CFGR, PLLCFGR; the other clock enables; BDCR, CSR, CRRCR.
-const REGISTERS: [Kept; 15] = [
-    Kept { offset: CR, reset: 0x100, mask: 0x010D_0300 },
-    kept(0x04, 0x4000_0000),
-    Kept { offset: CFGR, reset: 0x1, mask: 0x7F00_3FF3 },
-    kept(PLLCFGR, 0x1000),
-    kept(0x48, 0x100),
-    kept(0x58, 0x400),
-    kept(0x68, 0x130F),
-    kept(0x6C, 0x050F_667F),
-    kept(0x70, 0x101),
-    kept(0x78, 0xD2FE_CD3F),
-    kept(0x7C, 0x103),
-    kept(0x80, 0x0437_F801),
-    Kept { offset: BDCR, reset: 0, mask: 0x0301_837D },
-    Kept { offset: CSR, reset: 0, mask: 1 },
-    Kept { offset: CRRCR, reset: 0, mask: 1 },
-];
 
 /// Why the chip started, as flags of `CSR`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -85,12 +49,13 @@ pub enum Cause {
 impl Cause {
     const fn flags(self) -> u32 {
         // A reset of the chip's own also pulls the reset pin.
-        match self {
-            Self::Power => 1 << 27 | 1 << 26,
-            Self::Watchdog => 1 << 29 | 1 << 26,
-            Self::Software => 1 << 28 | 1 << 26,
-            Self::Pin => 1 << 26,
-        }
+        let own = match self {
+            Self::Power => csr::BORRSTF,
+            Self::Watchdog => csr::IWDGRSTF,
+            Self::Software => csr::SFTRSTF,
+            Self::Pin => csr::PINRSTF,
+        };
+        own.mask | csr::PINRSTF.mask
     }
 }
 
@@ -98,55 +63,53 @@ impl Cause {
 #[derive(Clone, Debug)]
 pub struct Rcc {
     registers: Registers,
-    flags: u32,
     /// Cycle at which each source is ready; never while it is off.
     ready: [u64; SOURCES.len()],
     /// `SW` of the source in use.
     used: u32,
-    broken: Option<Rule>,
 }
 
 impl Rcc {
     /// After a reset; `earlier` are the flags that were not cleared.
     pub fn new(cause: Cause, earlier: u32) -> Self {
-        Self {
-            registers: Registers::new(&REGISTERS, &WORDS, &READY),
-            flags: cause.flags() | earlier,
-            ready: [0, u64::MAX, u64::MAX, u64::MAX, u64::MAX, u64::MAX],
-            used: 1,
-            broken: None,
-        }
+        // The flags of ready clocks request no interrupt.
+        let mut registers = Registers::all(RCC, &[CIFR, CICR]);
+        // By RM0440, RCC_CR; the description has bits that are no fields.
+        registers.set(CR, cr::HSION.mask);
+        registers.set(CFGR, cfgr::SW.at(1));
+        registers.set(CSR, cause.flags() | earlier);
+        Self { registers, ready: [0, u64::MAX, u64::MAX, u64::MAX, u64::MAX, u64::MAX], used: 1 }
     }
 
     /// Flags of earlier resets that were not cleared.
-    pub const fn flags(&self) -> u32 {
-        self.flags
+    pub fn flags(&self) -> u32 {
+        self.registers.get(CSR) & !csr::LSION.mask
     }
 
-    /// Whether the clock of a peripheral is on: bit of the enable register at `offset`.
-    pub fn is_clocked(&self, offset: u32, bit: u32) -> bool {
-        self.registers.get(offset) >> bit & 1 != 0
+    /// Whether the clock of a peripheral is on, by its enable bit.
+    pub fn is_clocked(&self, enable: Field) -> bool {
+        self.registers.has(enable)
     }
 
     /// A selected clock is in use once it is ready.
     fn settle(&mut self, now: u64) {
-        let selected = self.registers.get(CFGR) & 3;
+        let selected = self.registers.field(cfgr::SW);
         let ready = SELECTED.iter().any(|(sw, at)| *sw == selected && self.ready[*at] <= now);
         self.used = if ready { selected } else { self.used };
     }
 
     /// Frequency of the core, Hz, for this content of `CFGR`; none if nothing is selected.
     fn hclk(&self, cfgr: u32) -> Option<u64> {
-        let sysclk = match cfgr & 3 {
+        let sysclk = match cfgr::SW.of(cfgr) {
             3 => {
-                let pll = self.registers.get(PLLCFGR);
-                let field = |lowest: u32, bits: u32| u64::from(pll >> lowest & ((1 << bits) - 1));
-                let source = OSCILLATORS.get((field(0, 2) as usize).checked_sub(2)?)?;
-                source / (field(4, 4) + 1) * field(8, 7) / (2 * (field(25, 2) + 1))
+                let field = |field| u64::from(self.registers.field(field));
+                let source = (field(pllcfgr::PLLSRC) as usize).checked_sub(2)?;
+                let input = OSCILLATORS.get(source)? / (field(pllcfgr::PLLM) + 1);
+                input * field(pllcfgr::PLLN) / (2 * (field(pllcfgr::PLLR) + 1))
             }
             other => *OSCILLATORS.get((other as usize).checked_sub(1)?)?,
         };
-        let halvings = match cfgr >> 4 & 0xF {
+        let halvings = match cfgr::HPRE.of(cfgr) {
             setting @ 8..=11 => setting - 7,
             // A division by 32 is left out.
             setting @ 12..=15 => setting - 6,
@@ -166,13 +129,14 @@ impl Rcc {
     ) -> Option<Rule> {
         self.settle(now);
         let old = self.registers.get(CFGR);
-        let (before, after) = (self.hclk(old & !3 | self.used)?, self.hclk(write.onto(old))?);
+        let used = old & !cfgr::SW.mask | cfgr::SW.at(self.used);
+        let (before, after) = (self.hclk(used)?, self.hclk(write.onto(old))?);
         let most = WAIT_STATES[usize::from(boosts)].get(wait_states as usize);
         if after > 150_000_000 && !boosts {
             Some(Rule::Boost)
         } else if most.is_some_and(|most| after > most * 1_000_000) {
             Some(Rule::WaitStates)
-        } else if write.onto(old) & 3 == 3 && after != HZ && after != HZ / 2 {
+        } else if cfgr::SW.of(write.onto(old)) == 3 && after != HZ && after != HZ / 2 {
             Some(Rule::EmulatedClock)
         } else if before < 80_000_000 && after > 80_000_000 && after != HZ / 2 {
             Some(Rule::ClockStep)
@@ -183,17 +147,15 @@ impl Rcc {
 
     /// The rule that a write of `next` over `old` at an offset would break.
     fn own_rule(&self, offset: u32, old: u32, next: u32) -> Option<Rule> {
-        let off = old & !next;
-        let runs = |bit: u32| self.registers.get(CR) & bit != 0;
+        // Outputs may be switched at any time.
+        let outputs = bits(&[pllcfgr::PLLPEN, pllcfgr::PLLQEN, pllcfgr::PLLREN]);
         match offset {
-            // `PLLPEN`, `PLLQEN` and `PLLREN` may be switched at any time.
-            PLLCFGR if runs(1 << 24) && (old ^ next) & !(1 << 16 | 1 << 20 | 1 << 24) != 0 => {
+            PLLCFGR if self.registers.has(cr::PLLON) && (old ^ next) & !outputs != 0 => {
                 Some(Rule::PllOn)
             }
             CR => {
-                let used = SELECTED.iter().find(|(sw, _)| *sw == self.used)?;
-                let (_, on, ..) = SOURCES[used.1];
-                (off & on != 0).then_some(Rule::ClockInUse)
+                let (_, used) = SELECTED.iter().find(|(sw, _)| *sw == self.used)?;
+                SOURCES[*used].0.is_in(old & !next).then_some(Rule::ClockInUse)
             }
             _ => None,
         }
@@ -205,34 +167,28 @@ impl Peripheral for Rcc {
         self.settle(now);
         let value = self.registers.read(offset)?;
         let sources = SOURCES.iter().zip(self.ready);
-        let ready = sources.filter(|((register, ..), at)| *register == offset && *at <= now);
-        let value = ready.fold(value, |value, ((_, _, bit, _), _)| value | bit);
-        Some(match offset {
-            CFGR => value | self.used << 2,
-            CSR => value | self.flags,
-            _ => value,
-        })
+        let ready = sources.filter(|((_, ready, _), at)| ready.register == offset && *at <= now);
+        let value = ready.fold(value, |value, ((_, ready, _), _)| value | ready.mask);
+        Some(if offset == CFGR { value | cfgr::SWS.at(self.used) } else { value })
     }
 
-    fn write(&mut self, offset: u32, write: Write, now: u64) -> Option<()> {
+    fn write(&mut self, offset: u32, write: Write, now: u64) -> Result<(), Why> {
         self.settle(now);
         let mut write = write;
         if offset == CSR {
-            if write.ones() >> 23 & 1 != 0 {
-                self.flags = 0;
+            if csr::RMVF.is_in(write.ones()) {
+                self.registers.clear(CSR, !csr::LSION.mask);
             }
-            write.mask &= 1;
+            write.mask &= csr::LSION.mask;
         }
         let old = self.registers.get(offset);
-        self.broken = self.own_rule(offset, old, write.onto(old));
-        if self.broken.is_some() {
-            return Some(());
+        if let Some(rule) = self.own_rule(offset, old, write.onto(old)) {
+            return Err(Why::Broken(rule));
         }
         self.registers.write(offset, write)?;
-        for ((register, on, _, us), ready) in SOURCES.iter().zip(&mut self.ready) {
-            if *register == offset {
-                let (was, is) = (old & on != 0, self.registers.get(offset) & on != 0);
-                *ready = match (was, is) {
+        for ((on, _, us), ready) in SOURCES.iter().zip(&mut self.ready) {
+            if on.register == offset {
+                *ready = match (on.is_in(old), self.registers.has(*on)) {
                     (false, true) => now + us * (HZ / 1_000_000),
                     (_, false) => u64::MAX,
                     _ => *ready,
@@ -240,33 +196,14 @@ impl Peripheral for Rcc {
             }
         }
         self.settle(now);
-        Some(())
-    }
-
-    fn take_broken_rule(&mut self) -> Option<Rule> {
-        self.broken.take()
+        Ok(())
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn write(rcc: &mut Rcc, offset: u32, value: u32) {
-        rcc.write(offset, Write { value, mask: ALL }, 0).expect("modelled");
-    }
-
-    #[test]
-    fn a_selected_clock_is_used_once_it_is_ready() {
-        let mut rcc = Rcc::new(Cause::Power, 0);
-        write(&mut rcc, CR, 1 << 24 | 1 << 8);
-        assert_eq!(rcc.read(CR, 0), Some(1 << 24 | 1 << 10 | 1 << 8));
-        write(&mut rcc, CFGR, 3);
-        let locked = 40 * (HZ / 1_000_000);
-        assert_eq!(rcc.read(CFGR, locked - 1), Some(1 << 2 | 3));
-        assert_eq!(rcc.read(CR, locked), Some(1 << 25 | 1 << 24 | 1 << 10 | 1 << 8));
-        assert_eq!(rcc.read(CFGR, locked), Some(0xF));
-    }
+    use crate::peripherals::tests::write;
 
     #[test]
     fn the_prescaler_of_the_bus_divides_by_powers_of_two_without_32() {
@@ -281,7 +218,7 @@ mod tests {
         let power = Rcc::new(Cause::Power, 0);
         let mut rcc = Rcc::new(Cause::Watchdog, power.flags());
         assert_eq!(rcc.read(CSR, 0), Some(1 << 29 | 1 << 27 | 1 << 26));
-        write(&mut rcc, CSR, 1 << 23);
+        write(&mut rcc, CSR, 1 << 23, 0);
         assert_eq!(rcc.read(CSR, 0), Some(0));
     }
 }

@@ -1,32 +1,20 @@
 //! SPI1 as master with frames of up to 16 bits, and the angle sensor at its other end.
 
-use super::registers::{Kept, Registers};
+use super::registers::Registers;
 use super::{Peripheral, Write};
+use crate::chip::Why;
+use crate::chip::description::{SPI1, bits, spi1::*};
 
 mod angle;
 
 pub use angle::AngleSensor;
 
-const CR1: u32 = 0x00;
-const CR2: u32 = 0x04;
-const SR: u32 = 0x08;
-/// Data register.
-pub(crate) const DR: u32 = 0x0C;
-
-const MASTER: u32 = 1 << 2;
-const ENABLE: u32 = 1 << 6;
-/// Bits of `CR1` that a master with two lines and no checksum uses.
-const PLAIN: u32 = 0x3FF;
-const TAKEN: u32 = 1;
-const EMPTY: u32 = 1 << 1;
-const OVERRUN: u32 = 1 << 6;
-const BUSY: u32 = 1 << 7;
-
-const REGISTERS: [Kept; 3] = [
-    Kept { offset: CR1, reset: 0, mask: PLAIN },
-    Kept { offset: CR2, reset: 0x700, mask: 0x7FFC },
-    Kept { offset: 0x10, reset: 7, mask: 0xFFFF },
+/// Registers that the model has in part: a master with two lines and no checksum, without DMA.
+const PARTS: [(u32, u32); 2] = [
+    (CR1, bits(&[cr1::CPHA, cr1::CPOL, cr1::MSTR, cr1::BR, cr1::SPE]) | SELECTS),
+    (CR2, !bits(&[cr2::RXDMAEN, cr2::TXDMAEN])),
 ];
+const SELECTS: u32 = bits(&[cr1::LSBFIRST, cr1::SSI, cr1::SSM]);
 
 /// A frame as it goes over the lines.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -56,7 +44,7 @@ pub struct Spi {
 impl Default for Spi {
     fn default() -> Self {
         Self {
-            registers: Registers::new(&REGISTERS, &[], &[0x1C]),
+            registers: Registers::of(SPI1, &[CRCPR], &PARTS, &[I2SCFGR]),
             next: None,
             shifting: None,
             taken: None,
@@ -67,15 +55,15 @@ impl Default for Spi {
 
 impl Spi {
     fn is_on(&self) -> bool {
-        self.registers.get(CR1) & (ENABLE | MASTER) == ENABLE | MASTER
+        self.registers.has(cr1::SPE) && self.registers.has(cr1::MSTR)
     }
 
     fn bits(&self) -> u32 {
-        (self.registers.get(CR2) >> 8 & 0xF) + 1
+        self.registers.field(cr2::DS) + 1
     }
 
     fn bit_cycles(&self) -> u64 {
-        2 << (self.registers.get(CR1) >> 3 & 7)
+        2 << self.registers.field(cr1::BR)
     }
 
     /// Whether a frame is on the lines.
@@ -96,11 +84,10 @@ impl Spi {
     pub fn over(&mut self, now: u64) -> Option<Frame> {
         let (sent, _) = self.shifting.filter(|(_, end)| *end <= now)?;
         self.shifting = None;
-        let bits = self.bits();
         Some(Frame {
-            sent: sent & (0xFFFF >> (16 - bits)),
-            bits,
-            mode: self.registers.get(CR1) & 3,
+            sent: sent & (0xFFFF >> (16 - self.bits())),
+            bits: self.bits(),
+            mode: self.registers.get(CR1) & bits(&[cr1::CPHA, cr1::CPOL]),
             bit_cycles: self.bit_cycles(),
         })
     }
@@ -120,14 +107,15 @@ impl Peripheral for Spi {
     fn read(&mut self, offset: u32, _: u64) -> Option<u32> {
         match offset {
             SR => {
-                let flag = |on: bool, bits: u32| if on { bits } else { 0 };
+                let [taken, waits] = [self.taken, self.next].map(|word| u32::from(word.is_some()));
                 // A word that waits shows as a filled quarter, half or more of the queues.
                 Some(
-                    flag(self.taken.is_some(), TAKEN | 2 << 9)
-                        | flag(self.next.is_none(), EMPTY)
-                        | flag(self.next.is_some(), 3 << 11)
-                        | flag(self.overrun, OVERRUN)
-                        | flag(self.shifting.is_some(), BUSY),
+                    sr::RXNE.at(taken)
+                        | sr::FRLVL.at(2 * taken)
+                        | sr::TXE.at(1 - waits)
+                        | sr::FTLVL.at(3 * waits)
+                        | sr::OVR.at(self.overrun.into())
+                        | sr::BSY.at(self.shifting.is_some().into()),
                 )
             }
             DR => {
@@ -138,7 +126,7 @@ impl Peripheral for Spi {
         }
     }
 
-    fn write(&mut self, offset: u32, write: Write, now: u64) -> Option<()> {
+    fn write(&mut self, offset: u32, write: Write, now: u64) -> Result<(), Why> {
         match offset {
             // Reading clears its flags.
             SR => {}
@@ -147,11 +135,10 @@ impl Peripheral for Spi {
                     self.next = Some(write.value as u16);
                 }
             }
-            CR1 if write.ones() & !PLAIN != 0 => return None,
             _ => self.registers.write(offset, write)?,
         }
         self.start(now);
-        Some(())
+        Ok(())
     }
 
     fn deadline(&self) -> u64 {
@@ -162,15 +149,12 @@ impl Peripheral for Spi {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn write(spi: &mut Spi, offset: u32, value: u32, now: u64) {
-        spi.write(offset, Write { value, mask: u32::MAX }, now).expect("modelled");
-    }
+    use crate::peripherals::tests::write;
 
     fn ready() -> Spi {
         let mut spi = Spi::default();
         write(&mut spi, CR2, 0xF << 8, 0);
-        write(&mut spi, CR1, 1 | MASTER | 4 << 3 | ENABLE, 0);
+        write(&mut spi, CR1, bits(&[cr1::CPHA, cr1::MSTR, cr1::SPE]) | cr1::BR.at(4), 0);
         spi
     }
 
@@ -178,7 +162,7 @@ mod tests {
     fn a_frame_takes_its_bits_and_brings_one_back() {
         let mut spi = ready();
         write(&mut spi, DR, 0xFFFF, 100);
-        assert_eq!(spi.read(SR, 0), Some(EMPTY | BUSY));
+        assert_eq!(spi.read(SR, 0), Some(bits(&[sr::TXE, sr::BSY])));
         assert_eq!(spi.deadline(), 100 + 16 * 32);
         assert_eq!(spi.over(611), None);
         let frame = Frame { sent: 0xFFFF, bits: 16, mode: 1, bit_cycles: 32 };
@@ -195,7 +179,7 @@ mod tests {
             assert!(spi.over(u64::MAX).is_some());
             spi.answer(word, 0);
         }
-        assert_eq!(spi.read(SR, 0).map(|flags| flags & OVERRUN), Some(OVERRUN));
+        assert_eq!(spi.read(SR, 0).map(|flags| sr::OVR.of(flags)), Some(1));
         assert_eq!(spi.read(DR, 0), Some(1));
     }
 

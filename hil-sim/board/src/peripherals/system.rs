@@ -8,6 +8,7 @@ mod mpu;
 mod tick;
 
 use super::{Peripheral, Write};
+use crate::chip::Why;
 use crate::exceptions::Exceptions;
 use crate::exceptions::number::INTERRUPT;
 
@@ -38,6 +39,11 @@ impl System {
         }
     }
 
+    /// Notes a fault, see [`Control::fault`].
+    pub fn fault(&mut self, cause: Cause, masked: bool) -> Option<u8> {
+        self.control.fault(cause, &self.exceptions, masked)
+    }
+
     /// Priorities of four exceptions from `first` on, as a word.
     fn priorities(&self, first: u32) -> u32 {
         (0..4).fold(0, |word, byte| {
@@ -55,16 +61,10 @@ impl System {
         }
     }
 
-    /// Makes interrupts pending by a word of the registers.
-    fn pend(&mut self, word: u32, set: u32, now: u64) {
+    /// Changes each interrupt whose bit is set in a word of the registers.
+    fn each(&mut self, word: u32, set: u32, change: impl Fn(&mut Exceptions, u8)) {
         for bit in (0..32).filter(|bit| set >> bit & 1 != 0) {
-            self.exceptions.pend(INTERRUPT + (32 * word + bit) as u8, now);
-        }
-    }
-
-    fn unpend(&mut self, word: u32, set: u32) {
-        for bit in (0..32).filter(|bit| set >> bit & 1 != 0) {
-            self.exceptions.clear(INTERRUPT + (32 * word + bit) as u8);
+            change(&mut self.exceptions, INTERRUPT + (32 * word + bit) as u8);
         }
     }
 }
@@ -87,14 +87,14 @@ impl Peripheral for System {
         })
     }
 
-    fn write(&mut self, offset: u32, write: Write, now: u64) -> Option<()> {
+    fn write(&mut self, offset: u32, write: Write, now: u64) -> Result<(), Why> {
         let (word, ones) = ((offset & 0x7F) / 4, write.ones());
         match offset {
             0x010..=0x01C => self.tick.write(offset, write, now)?,
             0x100..=0x10C => self.exceptions.enable(word & 3, ones, true),
             0x180..=0x18C => self.exceptions.enable(word & 3, ones, false),
-            0x200..=0x20C => self.pend(word & 3, ones, now),
-            0x280..=0x28C => self.unpend(word & 3, ones),
+            0x200..=0x20C => self.each(word & 3, ones, |all, number| all.pend(number, now)),
+            0x280..=0x28C => self.each(word & 3, ones, Exceptions::clear),
             0x400..=0x464 => self.set_priorities(u32::from(INTERRUPT) + offset - 0x400, write),
             0xD18..=0xD20 => self.set_priorities(4 + offset - 0xD18, write),
             0xD90..=0xDA0 => self.mpu.write(offset, write)?,
@@ -102,7 +102,7 @@ impl Peripheral for System {
             0xF00 => self.exceptions.pend(INTERRUPT.saturating_add((ones & 0x1FF) as u8), now),
             _ => self.control.write(offset, write, &mut self.exceptions, now)?,
         }
-        Some(())
+        Ok(())
     }
 
     fn deadline(&self) -> u64 {

@@ -3,42 +3,21 @@
 //! It counts up with prescaler and reload, and sets a flag when it reaches a compare
 //! register or overflows. The registers of TIM2 are 32 bits wide, of TIM7 16.
 
-use super::registers::{Kept, Registers};
+use super::registers::Registers;
 use super::{Peripheral, Write};
+use crate::chip::Why;
+use crate::chip::description::{TIM2, TIM7, bits, tim2::*};
 
-const CR1: u32 = 0x00;
-const DIER: u32 = 0x0C;
-const SR: u32 = 0x10;
-const EGR: u32 = 0x14;
-const CNT: u32 = 0x24;
-const PSC: u32 = 0x28;
-const ARR: u32 = 0x2C;
-const CCR1: u32 = 0x34;
-
-const ALL: u32 = u32::MAX;
-const ENABLE: u32 = 1;
-/// `URS`: only an overflow sets the update flag.
-const OVERFLOW_ONLY: u32 = 1 << 2;
-/// Update and the four compares.
-const FLAGS: u32 = 0x1F;
 /// Directions, one-pulse mode, alternate clocks: none of them modelled.
-const PLAIN: u32 = ENABLE | 1 << 1 | OVERFLOW_ONLY | 1 << 7;
-
-const fn registers(flags: u32, reload: u32) -> [Kept; 4] {
-    [
-        Kept { offset: CR1, reset: 0, mask: PLAIN },
-        Kept { offset: DIER, reset: 0, mask: flags },
-        Kept { offset: PSC, reset: 0, mask: 0xFFFF },
-        Kept { offset: ARR, reset: reload, mask: reload },
-    ]
-}
+const PLAIN: u32 = bits(&[cr1::CEN, cr1::UDIS, cr1::URS, cr1::ARPE]);
+/// Interrupts of update and compares, in the order of the flags.
+const INTERRUPTS: u32 = bits(&[dier::UIE, dier::CC1IE, dier::CC2IE, dier::CC3IE, dier::CC4IE]);
 
 /// The timer.
 #[derive(Clone, Debug)]
 pub struct TimeBase {
     registers: Registers,
     /// Flags: one, and one for each compare register.
-    bits: u32,
     flags: u32,
     /// Cycle at which the counter was zero, while it runs.
     origin: u64,
@@ -55,13 +34,13 @@ pub struct TimeBase {
 impl Default for TimeBase {
     fn default() -> Self {
         Self {
-            registers: Registers::new(
-                &registers(FLAGS, ALL),
-                &[CCR1, CCR1 + 4, CCR1 + 8, CCR1 + 12],
-                &[0x04, 0x08, 0x18, 0x1C],
+            registers: Registers::of(
+                TIM2,
+                &[SR, PSC, ARR, CCR1, CCR2, CCR3, CCR4],
+                &[(CR1, PLAIN), (DIER, INTERRUPTS)],
+                &[CR2, SMCR, EGR, CCMR1_OUTPUT, CCMR2_OUTPUT],
             ),
-            bits: 5,
-            flags: 0,
+            flags: 5,
             origin: 0,
             seen: 0,
             prescaler: 1,
@@ -74,12 +53,13 @@ impl Default for TimeBase {
 impl TimeBase {
     /// Without compare registers.
     pub fn basic() -> Self {
-        let registers = Registers::new(&registers(1, 0xFFFF), &[], &[0x04]);
-        Self { registers, bits: 1, ..Self::default() }
+        let parts = [(CR1, PLAIN), (DIER, dier::UIE.mask), (ARR, 0xFFFF)];
+        let registers = Registers::of(TIM7, &[SR, PSC], &parts, &[CR2, EGR]);
+        Self { registers, flags: 1, ..Self::default() }
     }
 
     fn runs(&self) -> bool {
-        self.registers.get(CR1) & ENABLE != 0
+        self.registers.has(cr1::CEN)
     }
 
     fn period(&self) -> u64 {
@@ -110,11 +90,11 @@ impl TimeBase {
     fn update(&mut self, now: u64) {
         let counts = self.counts(now);
         if now >= self.flag_due {
-            for bit in 0..self.bits {
-                if self.meets(self.seen, self.value_of(bit)).is_some_and(|at| at <= counts) {
-                    self.flags |= 1 << bit;
-                }
-            }
+            let met = |bit: &u32| {
+                self.meets(self.seen, self.value_of(*bit)).is_some_and(|at| at <= counts)
+            };
+            let met = (0..self.flags).filter(met).fold(0, |flags, bit| flags | 1 << bit);
+            self.registers.set(SR, self.registers.get(SR) | met);
             self.seen = counts;
             self.schedule();
         }
@@ -124,12 +104,13 @@ impl TimeBase {
     /// Computes when the next flags are set.
     fn schedule(&mut self) {
         let next = |flags: u32| {
-            let bits = (0..self.bits).filter(|bit| flags >> bit & 1 != 0);
+            let bits = (0..self.flags).filter(|bit| flags >> bit & 1 != 0);
             let counts = bits.filter_map(|bit| self.meets(self.seen, self.value_of(bit))).min();
             counts.map_or(u64::MAX, |count| self.origin.wrapping_add(count * self.prescaler))
         };
+        let cleared = !self.registers.get(SR);
         (self.flag_due, self.due) = if self.runs() {
-            (next(!self.flags), next(self.registers.get(DIER) & !self.flags))
+            (next(cleared), next(self.registers.get(DIER) & cleared))
         } else {
             (u64::MAX, u64::MAX)
         };
@@ -149,36 +130,34 @@ impl TimeBase {
     }
 
     /// Changes a register.
-    fn put(&mut self, offset: u32, write: Write, now: u64) -> Option<()> {
+    fn put(&mut self, offset: u32, write: Write, now: u64) -> Result<(), Why> {
         self.update(now);
         match offset {
-            SR => self.flags &= !(write.mask & !write.value),
+            SR => self.registers.clear(SR, write.zeros()),
             CNT => self.place(u64::from(write.value), now),
-            EGR if write.ones() & !1 == 0 => {
-                if write.ones() & 1 != 0 {
-                    self.prescaler = u64::from(self.registers.get(PSC)) + 1;
-                    self.place(0, now);
-                    if self.registers.get(CR1) & OVERFLOW_ONLY == 0 {
-                        self.flags |= 1;
-                    }
+            EGR if write.ones() == egr::UG.mask => {
+                self.prescaler = u64::from(self.registers.get(PSC)) + 1;
+                self.place(0, now);
+                // With `URS` only an overflow sets the flag.
+                if !self.registers.has(cr1::URS) {
+                    self.registers.put(sr::UIF, 1);
                 }
             }
-            CR1 if write.ones() & !PLAIN == 0 => {
+            CR1 => {
                 let ran = self.runs();
                 self.registers.write(CR1, write)?;
                 if self.runs() && !ran {
                     self.place(self.seen, now);
                 }
             }
-            CR1 | EGR => return None,
             _ => self.registers.write(offset, write)?,
         }
-        Some(())
+        Ok(())
     }
 
     /// Whether it requests its interrupt.
     pub fn requests(&self) -> bool {
-        self.flags & self.registers.get(DIER) != 0
+        self.registers.get(SR) & self.registers.get(DIER) != 0
     }
 }
 
@@ -187,13 +166,11 @@ impl Peripheral for TimeBase {
         self.update(now);
         match offset {
             CNT => Some((self.counts(now) % self.period()) as u32),
-            SR => Some(self.flags),
-            EGR => Some(0),
             _ => self.registers.read(offset),
         }
     }
 
-    fn write(&mut self, offset: u32, write: Write, now: u64) -> Option<()> {
+    fn write(&mut self, offset: u32, write: Write, now: u64) -> Result<(), Why> {
         let taken = self.put(offset, write, now);
         self.schedule();
         taken
@@ -211,19 +188,16 @@ impl Peripheral for TimeBase {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn write(timer: &mut TimeBase, offset: u32, value: u32, now: u64) {
-        timer.write(offset, Write { value, mask: ALL }, now).expect("modelled");
-    }
+    use crate::peripherals::tests::write;
 
     /// At 1 MHz with 16 bits from cycle 1000 on.
     fn running() -> TimeBase {
         let mut timer = TimeBase::default();
         write(&mut timer, PSC, 169, 0);
         write(&mut timer, ARR, 0xFFFF, 0);
-        write(&mut timer, CR1, OVERFLOW_ONLY, 0);
-        write(&mut timer, EGR, 1, 0);
-        write(&mut timer, CR1, ENABLE, 1000);
+        write(&mut timer, CR1, cr1::URS.mask, 0);
+        write(&mut timer, EGR, egr::UG.mask, 0);
+        write(&mut timer, CR1, cr1::CEN.mask, 1000);
         timer
     }
 
@@ -239,8 +213,8 @@ mod tests {
     #[test]
     fn a_compare_requests_its_interrupt_when_it_is_reached() {
         let mut timer = running();
-        write(&mut timer, CCR1 + 4, 500, 1000);
-        write(&mut timer, DIER, 1 << 2, 1000);
+        write(&mut timer, CCR2, 500, 1000);
+        write(&mut timer, DIER, dier::CC2IE.mask, 1000);
         let due = 1000 + 170 * 500;
         assert_eq!(timer.deadline(), due);
         timer.advance(due - 1);
@@ -248,7 +222,7 @@ mod tests {
         timer.advance(due);
         assert!(timer.requests());
         assert_eq!(timer.deadline(), u64::MAX, "already requested");
-        write(&mut timer, SR, !(1 << 2), due + 5);
+        write(&mut timer, SR, !sr::CC2IF.mask, due + 5);
         assert!(!timer.requests());
         assert_eq!(timer.deadline(), due + 170 * 65_536);
     }
@@ -257,13 +231,7 @@ mod tests {
     fn a_compare_beyond_the_reload_is_never_met() {
         let mut timer = running();
         write(&mut timer, CCR1, 0x1_0000, 1000);
-        write(&mut timer, DIER, 1 << 1, 1000);
+        write(&mut timer, DIER, dier::CC1IE.mask, 1000);
         assert_eq!(timer.deadline(), u64::MAX);
-    }
-
-    #[test]
-    fn counting_down_is_not_modelled() {
-        let mut timer = TimeBase::default();
-        assert_eq!(timer.write(CR1, Write { value: 1 << 4, mask: ALL }, 0), None);
     }
 }

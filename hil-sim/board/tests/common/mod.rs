@@ -2,17 +2,21 @@
 
 use std::sync::OnceLock;
 
+use hil_sim::faults::campaign::{Case, FaultCampaign, Outcome, Twin};
 use hil_sim::firmware::{self, Profile};
 use hil_sim::record::Run;
 use hil_sim::scenario::Scenario;
 use interstage::restart::Restart;
 use interstage::tick::Event;
 use rig_board::bench::{Bench, Passed};
+use rig_board::campaign::{self, Firmware};
+use rig_board::chip::Pin;
 use rig_board::core::Register;
 use rig_board::faults::Fault;
 use rig_board::log::Strings;
 use rig_board::machine::Machine;
 use rig_board::peripherals::rcc::Cause;
+use rig_board::run::{self, Ran, RunOptions};
 
 /// The image as it would be flashed.
 pub(crate) fn elf() -> &'static [u8] {
@@ -30,6 +34,25 @@ pub(crate) fn strings() -> &'static Strings {
 pub(crate) fn scenario(sets: &[&str]) -> Scenario {
     let sets: Vec<String> = sets.iter().map(|set| (*set).to_owned()).collect();
     Scenario::resolve(Some("prototype"), None, &sets).expect("a scenario")
+}
+
+/// A run of a scenario, with its rows if wanted.
+pub(crate) fn ran(scenario: &Scenario, rows: bool) -> Ran {
+    let options = RunOptions { rows, ..RunOptions::default() };
+    run::run(elf(), scenario, &options, |_, _| {}).expect("a run")
+}
+
+/// Tries these faults on the board, so many instants each: none is undetected or harmful.
+pub(crate) fn tried(cases: Vec<Case>, instants: usize) -> Outcome {
+    let firmware = Firmware { elf: elf(), strings: strings() };
+    let campaign = FaultCampaign { scenario: Scenario::default(), instants, cases };
+    let rigs = campaign.rigs(|scenario| campaign::twin(firmware, scenario), &|| {});
+    let watched = |scenario: &Scenario, twin: &Twin| campaign::watched(firmware, scenario, twin);
+    let outcome = campaign.on("board", &rigs.expect("rigs"), watched).complete(&|| {});
+    let outcome = outcome.expect("a campaign");
+    let failures: Vec<_> = outcome.matrix.iter().flat_map(|line| &line.failures).collect();
+    assert_eq!((outcome.undetected, outcome.unheld), (0, 0), "{failures:#?}");
+    outcome
 }
 
 /// A running board with its two logs.
@@ -106,6 +129,14 @@ impl Board {
         }
     }
 
+    /// Opens or closes the contact of the emergency stop.
+    pub(crate) fn open_stop(&mut self, open: bool) {
+        let now = self.machine().now();
+        for pin in [Pin::STOP_DRIVE, Pin::STOP_PRELOAD] {
+            self.machine().chip_mut().drive(pin, open, now);
+        }
+    }
+
     pub(crate) fn position_mm(&self) -> f64 {
         self.bench.plant.truth().position_mm
     }
@@ -115,12 +146,12 @@ impl Board {
     }
 
     pub(crate) fn strike(&mut self, fault: Fault) {
-        fault.strike(self.machine()).expect("strikes");
+        fault.switch(self.machine(), true).expect("strikes");
     }
 
     /// Address of the first function whose name contains this.
     pub(crate) fn function(&self, name: &str) -> u32 {
-        let functions = &self.bench.machine.image().functions;
+        let functions = &self.bench.machine.image.functions;
         let found = functions.iter().find(|function| function.name.contains(name));
         found.unwrap_or_else(|| panic!("no function {name}")).range.start
     }

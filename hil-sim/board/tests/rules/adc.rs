@@ -2,87 +2,59 @@
 
 use rig_board::rules::Rule;
 
-use super::{Program, US};
+use super::Step::{Set, Wait};
+use super::{Program, Step, US};
+
+const REGULATOR: Step = Set("ADC1.CR", &[("DEEPPWD", 0), ("ADVREGEN", 1)]);
+const CALIBRATE: Step = Set("ADC1.CR", &[("ADCAL", 1)]);
+const ENABLE: Step = Set("ADC1.CR", &[("ADEN", 1)]);
+const START: Step = Set("ADC1.CR", &[("ADSTART", 1)]);
+const DISABLE: Step = Set("ADC1.CR", &[("ADDIS", 1)]);
+const CONTINUOUS: Step = Set("ADC1.CFGR", &[("CONT", 1)]);
+
+/// From where, what is done, and the rule that the last step breaks: it changes nothing.
+type Case = (fn() -> Program, &'static [Step], Rule);
+
+const CASES: [Case; 10] = [
+    (Program::new, &[REGULATOR, Wait(20 * US - 1), CALIBRATE], Rule::AdcRegulator),
+    (Program::new, &[REGULATOR, Wait(20 * US), ENABLE], Rule::AdcCalibration),
+    (Program::converter, &[CALIBRATE], Rule::AdcCalibration),
+    (Program::calibrated, &[Wait(4 * 4 - 1), ENABLE], Rule::AdcEnable),
+    (Program::calibrated, &[Wait(4 * 4), ENABLE, START], Rule::AdcReady),
+    (
+        Program::converter,
+        &[CONTINUOUS, START, Set("ADC1.SMPR1", &[("SMP1", 3)])],
+        Rule::AdcConfiguration,
+    ),
+    (Program::converter, &[CONTINUOUS, START, DISABLE], Rule::AdcDisable),
+    (Program::converter, &[Set("ADC12_COMMON.CCR", &[("PRESC", 3)])], Rule::AdcDisabledOnly),
+    (Program::converter, &[Set("ADC1.DIFSEL", &[("DIFSEL1", 1)])], Rule::AdcDisabledOnly),
+    (
+        Program::new,
+        &[
+            Set("ADC12_COMMON.CCR", &[("PRESC", 1)]),
+            REGULATOR,
+            Wait(20 * US),
+            CALIBRATE,
+            Wait(10 * US),
+            ENABLE,
+            Wait(10 * US),
+            START,
+        ],
+        Rule::AdcClock,
+    ),
+];
 
 #[test]
-fn adc_regulator_takes_20_us_before_anything_else() {
-    let mut program = Program::new();
-    program.set("ADC1.CR", &[("DEEPPWD", 0), ("ADVREGEN", 1)]);
-    program.wait(20 * US - 1);
-    program.set("ADC1.CR", &[("ADCAL", 1)]);
-    assert!(!program.is_set("ADC1.CR", "ADCAL"));
-    program.assert_broken(Rule::AdcRegulator);
-}
-
-#[test]
-fn adc_calibration_comes_before_the_enabling() {
-    let mut program = Program::new();
-    program.set("ADC1.CR", &[("DEEPPWD", 0), ("ADVREGEN", 1)]);
-    program.wait(20 * US);
-    program.set("ADC1.CR", &[("ADEN", 1)]);
-    assert!(!program.is_set("ADC1.CR", "ADEN"));
-    program.assert_broken(Rule::AdcCalibration);
-    let mut program = Program::converter();
-    program.set("ADC1.CR", &[("ADCAL", 1)]);
-    program.assert_broken(Rule::AdcCalibration);
-}
-
-#[test]
-fn adc_enabling_waits_four_clocks_after_the_calibration() {
-    let mut program = Program::calibrated();
-    program.wait(4 * 4 - 1);
-    program.set("ADC1.CR", &[("ADEN", 1)]);
-    assert!(!program.is_set("ADC1.CR", "ADEN"));
-    program.assert_broken(Rule::AdcEnable);
-}
-
-#[test]
-fn adc_converts_only_after_adrdy() {
-    let mut program = Program::calibrated();
-    program.wait(4 * 4);
-    program.set("ADC1.CR", &[("ADEN", 1)]);
-    program.set("ADC1.CR", &[("ADSTART", 1)]);
-    assert!(!program.is_set("ADC1.CR", "ADSTART"));
-    program.assert_broken(Rule::AdcReady);
-}
-
-#[test]
-fn adc_is_not_disabled_or_set_up_while_it_converts() {
-    let mut program = Program::converter();
-    program.set("ADC1.CFGR", &[("CONT", 1)]);
-    program.set("ADC1.CR", &[("ADSTART", 1)]);
-    assert_eq!(program.broken(), []);
-    program.set("ADC1.SMPR1", &[("SMP1", 3)]);
-    assert_eq!(program.read("ADC1.SMPR1"), 0);
-    program.assert_broken(Rule::AdcConfiguration);
-    let mut program = Program::converter();
-    program.set("ADC1.CFGR", &[("CONT", 1)]);
-    program.set("ADC1.CR", &[("ADSTART", 1)]);
-    program.set("ADC1.CR", &[("ADDIS", 1)]);
-    assert!(program.is_set("ADC1.CR", "ADEN"));
-    program.assert_broken(Rule::AdcDisable);
-}
-
-#[test]
-fn adc_common_and_differential_settings_want_disabled_converters() {
-    let mut program = Program::converter();
-    program.set("ADC12_COMMON.CCR", &[("PRESC", 3)]);
-    program.assert_broken(Rule::AdcDisabledOnly);
-    let mut program = Program::converter();
-    program.set("ADC1.DIFSEL", &[("DIFSEL1", 1)]);
-    program.assert_broken(Rule::AdcDisabledOnly);
-}
-
-#[test]
-fn adc_clock_is_at_most_60_mhz() {
-    let mut program = Program::new();
-    program.set("ADC12_COMMON.CCR", &[("PRESC", 1)]);
-    program.set("ADC1.CR", &[("DEEPPWD", 0), ("ADVREGEN", 1)]);
-    program.wait(20 * US);
-    program.set("ADC1.CR", &[("ADCAL", 1)]);
-    program.wait(10 * US);
-    program.set("ADC1.CR", &[("ADEN", 1)]);
-    program.wait(10 * US);
-    program.set("ADC1.CR", &[("ADSTART", 1)]);
-    program.assert_broken(Rule::AdcClock);
+fn converters_are_used_in_their_order_and_time() {
+    for (number, (from, steps, rule)) in CASES.into_iter().enumerate() {
+        let mut program = from();
+        let (last, before) = steps.split_last().expect("a step");
+        before.iter().for_each(|step| program.take(*step));
+        assert_eq!(program.broken(), [], "case {number}");
+        let Set(register, _) = *last else { panic!("case {number} ends with a wait") };
+        let old = program.read(register);
+        program.take(*last);
+        assert_eq!((program.read(register), program.broken()), (old, vec![rule]), "case {number}");
+    }
 }

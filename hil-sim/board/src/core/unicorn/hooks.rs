@@ -4,7 +4,7 @@ use unicorn_engine::{HookType, RegisterARM};
 
 use super::{
     BREAKPOINT, Bus, CALL, CoreError, Counted, Fault, Hooked, Inside, Mark, RETURN, RETURN_BITS,
-    SEV, Stop, Touch, UnicornCore, WFE, engine, forget_condition, general, passes,
+    Register, SEV, Stop, Touch, UnicornCore, WFE, engine, forget_condition, name, passes,
 };
 use crate::thumb::{self, Kind};
 use crate::timing;
@@ -184,7 +184,7 @@ impl<B: Bus + 'static> UnicornCore<B> {
 /// Adds what an instruction costs beyond its first cycle.
 fn spend<B>(uc: &mut Hooked<'_, B>, kind: Kind) {
     let cycles = if let Kind::Divide { signed, n, m } = kind {
-        let value = |number| uc.reg_read(general(number)).unwrap_or_default() as u32;
+        let value = |number| uc.reg_read(name(Register::R(number))).unwrap_or_default() as u32;
         timing::division(signed, value(n), value(m)) - 1
     } else {
         timing::extra(kind)

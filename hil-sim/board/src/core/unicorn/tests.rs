@@ -17,7 +17,7 @@ fn core(code: &[u16]) -> UnicornCore {
         Memory { base: RAM, size: 0x1000, access: Access::Data },
     ];
     let counted = Counted { base: FLASH, bytes: &bytes, code: std::slice::from_ref(&range) };
-    let mut core = UnicornCore::new(&memories, &counted).expect("a core");
+    let mut core = UnicornCore::new(&memories, &counted, NoBus).expect("a core");
     core.set_register(Register::R(0), RAM).expect("set");
     core.set_register(Register::Sp, RAM + 0x1000).expect("set");
     core
@@ -32,64 +32,39 @@ fn cost(core: &mut UnicornCore) -> (u64, u64) {
     (spent.cycles - 1, spent.instructions - 1)
 }
 
-#[test]
-fn straight_code_costs_its_instructions_and_words() {
-    // adds r1, r1, #1; ldr r2, [r0]; push {r1, r2, r3}; ldrd r4, r5, [r0]
-    let mut core = core(&[0x3101, 0x6802, 0xB40E, 0xE9D0, 0x4500]);
-    assert_eq!(cost(&mut core), (1 + 2 + 4 + 3, 4));
-}
+/// Code, contents of registers, cycles and instructions.
+type Priced = (&'static [u16], &'static [(u8, u32)], (u64, u64));
 
 #[test]
-fn a_branch_taken_refills_the_pipeline_and_one_not_taken_does_not() {
-    // cmp r1, #0; beq to the breakpoint; nop
-    let code = [0x2900, 0xD000, 0xBF00];
-    let mut taken = core(&code);
-    taken.set_register(Register::R(1), 0).expect("set");
-    assert_eq!(cost(&mut taken), (2 + REFILL, 2));
-    let mut passed = core(&code);
-    passed.set_register(Register::R(1), 1).expect("set");
-    assert_eq!(cost(&mut passed), (3, 3));
-}
-
-#[test]
-fn what_a_condition_skips_costs_one_cycle() {
-    // cmp r1, #0; itt eq; ldmeq r0, {r2, r3, r4}; udiveq r5, r6, r7
-    let code = [0x2900, 0xBF04, 0xE890, 0x001C, 0xFBB6, 0xF5F7];
-    let mut skipped = core(&code);
-    skipped.set_register(Register::R(1), 1).expect("set");
-    assert_eq!(cost(&mut skipped), (4, 4));
-    let mut done = core(&code);
-    done.set_register(Register::R(1), 0).expect("set");
-    done.set_register(Register::R(6), u32::MAX).expect("set");
-    done.set_register(Register::R(7), 1).expect("set");
-    assert_eq!(cost(&mut done), (2 + 4 + 12, 4));
-    assert_eq!(done.register(Register::R(5)), Ok(u32::MAX));
-}
-
-#[test]
-fn a_division_costs_by_its_operands() {
-    // sdiv r1, r2, r3
-    let mut core = core(&[0xFB92, 0xF1F3]);
-    core.set_register(Register::R(2), -5_i32 as u32).expect("set");
-    core.set_register(Register::R(3), 7).expect("set");
-    assert_eq!(cost(&mut core), (2, 1));
-    core.set_register(Register::R(2), i32::MIN as u32).expect("set");
-    core.set_register(Register::R(3), 1).expect("set");
-    assert_eq!(cost(&mut core), (12, 1));
-}
-
-#[test]
-fn a_loop_costs_every_round() {
-    // movs r1, #3; subs r1, #1; bne to the subtraction
-    let mut core = core(&[0x2103, 0x3901, 0xD1FD]);
-    assert_eq!(cost(&mut core), (1 + 3 * 2 + 2 * REFILL, 7));
-}
-
-#[test]
-fn floating_point_has_its_own_prices() {
-    // vdiv.f32 s0, s1, s2; vadd.f32 s0, s0, s1; vfma.f32 s0, s1, s2
-    let mut core = core(&[0xEE80, 0x0A81, 0xEE30, 0x0A20, 0xEEA0, 0x0A81]);
-    assert_eq!(cost(&mut core), (14 + 1 + 3, 3));
+fn code_costs_its_cycles() {
+    /// cmp r1, #0; beq to the breakpoint; nop
+    const BRANCH: &[u16] = &[0x2900, 0xD000, 0xBF00];
+    /// cmp r1, #0; itt eq; ldmeq r0, {r2, r3, r4}; udiveq r5, r6, r7
+    const CONDITIONAL: &[u16] = &[0x2900, 0xBF04, 0xE890, 0x001C, 0xFBB6, 0xF5F7];
+    /// sdiv r1, r2, r3
+    const DIVISION: &[u16] = &[0xFB92, 0xF1F3];
+    let cases: [Priced; 9] = [
+        // adds r1, r1, #1; ldr r2, [r0]; push {r1, r2, r3}; ldrd r4, r5, [r0]
+        (&[0x3101, 0x6802, 0xB40E, 0xE9D0, 0x4500], &[], (1 + 2 + 4 + 3, 4)),
+        (BRANCH, &[(1, 0)], (2 + REFILL, 2)),
+        (BRANCH, &[(1, 1)], (3, 3)),
+        // What a condition skips costs one cycle.
+        (CONDITIONAL, &[(1, 1)], (4, 4)),
+        (CONDITIONAL, &[(1, 0), (6, u32::MAX), (7, 1)], (2 + 4 + 12, 4)),
+        (DIVISION, &[(2, -5_i32 as u32), (3, 7)], (2, 1)),
+        (DIVISION, &[(2, i32::MIN as u32), (3, 1)], (12, 1)),
+        // movs r1, #3; subs r1, #1; bne to the subtraction
+        (&[0x2103, 0x3901, 0xD1FD], &[], (1 + 3 * 2 + 2 * REFILL, 7)),
+        // vdiv.f32 s0, s1, s2; vadd.f32 s0, s0, s1; vfma.f32 s0, s1, s2
+        (&[0xEE80, 0x0A81, 0xEE30, 0x0A20, 0xEEA0, 0x0A81], &[], (14 + 1 + 3, 3)),
+    ];
+    for (code, registers, expected) in cases {
+        let mut core = core(code);
+        for (register, value) in registers {
+            core.set_register(Register::R(*register), *value).expect("set");
+        }
+        assert_eq!(cost(&mut core), expected, "{code:x?} {registers:x?}");
+    }
 }
 
 #[test]

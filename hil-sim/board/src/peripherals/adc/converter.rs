@@ -1,34 +1,11 @@
 //! One converter: its registers, and its conversions in their times.
 
-use super::{CFGR, CFGR2, CR, DR, ISR, JDR, JSQR, SMPR1, SQR1};
-use crate::peripherals::registers::{Kept, Registers};
+use crate::chip::Why;
+use crate::chip::description::{ADC1, Field, adc1::*, bits};
+use crate::peripherals::registers::Registers;
 use crate::peripherals::{HZ, Write};
 use crate::rules::Rule;
 
-const ALL: u32 = u32::MAX;
-
-/// Of the configuration: DMA, keep the newest code, one conversion after the other.
-pub(super) const DMA: u32 = 1;
-pub(super) const OVERWRITE: u32 = 1 << 12;
-pub(super) const CONTINUOUS: u32 = 1 << 13;
-
-pub(super) const ENABLE: u32 = 1;
-pub(super) const DISABLE: u32 = 1 << 1;
-pub(super) const START: u32 = 1 << 2;
-pub(super) const INJECT: u32 = 1 << 3;
-pub(super) const STOP: u32 = 1 << 4;
-pub(super) const REGULATOR: u32 = 1 << 28;
-pub(super) const DEEP: u32 = 1 << 29;
-pub(super) const CALIBRATE: u32 = 1 << 31;
-pub(super) const READY: u32 = 1;
-pub(super) const END: u32 = 1 << 2;
-pub(super) const END_OF_SEQUENCE: u32 = 1 << 3;
-pub(super) const OVERRUN: u32 = 1 << 4;
-pub(super) const INJECTED: u32 = 1 << 5;
-pub(super) const INJECTED_SEQUENCE: u32 = 1 << 6;
-/// Oversampling of regular and of injected conversions.
-pub(super) const OVERSAMPLED: u32 = 1;
-pub(super) const INJECTED_OVERSAMPLED: u32 = 1 << 1;
 /// Converter clocks that a calibration takes, from its end to the enabling, and from the enabling
 /// to `ADRDY`: a conversion.
 pub(super) const CALIBRATION: u64 = 116;
@@ -39,84 +16,65 @@ pub(super) const REGULATOR_START: u64 = 20 * (HZ / 1_000_000);
 /// Highest clock of a converter, Hz.
 pub(super) const HIGHEST_CLOCK: u64 = 60_000_000;
 
-/// IER, CFGR, CFGR2, sampling times, watchdogs, sequences, DIFSEL, CALFACT.
-const REGISTERS: [Kept; 14] = [
-    Kept { offset: 0x04, reset: 0, mask: 0x7FF },
-    Kept { offset: CFGR, reset: 0x8000_0000, mask: ALL },
-    Kept { offset: CFGR2, reset: 0, mask: 0x0E0F_07FF },
-    Kept { offset: SMPR1, reset: 0, mask: 0xBFFF_FFFF },
-    Kept { offset: SMPR1 + 4, reset: 0, mask: 0x07FF_FFFF },
-    Kept { offset: 0x20, reset: 0x0FFF_0000, mask: 0x0FFF_7FFF },
-    Kept { offset: 0x24, reset: 0x00FF_0000, mask: 0x00FF_00FF },
-    Kept { offset: 0x28, reset: 0x00FF_0000, mask: 0x00FF_00FF },
-    Kept { offset: SQR1, reset: 0, mask: 0x1F7D_F7CF },
-    Kept { offset: SQR1 + 4, reset: 0, mask: 0x1F7D_F7DF },
-    Kept { offset: SQR1 + 8, reset: 0, mask: 0x1F7D_F7DF },
-    Kept { offset: SQR1 + 12, reset: 0, mask: 0x7DF },
-    Kept { offset: 0xB0, reset: 0, mask: 0x0007_FFFF },
-    Kept { offset: 0xB4, reset: 0, mask: 0x007F_007F },
+/// Registers that the model has whole.
+const WHOLE: [u32; 22] = [
+    ISR, IER, CR, CFGR, CFGR2, SMPR1, SMPR2, TR1, TR2, TR3, SQR1, SQR2, SQR3, SQR4, DR, JSQR, JDR1,
+    JDR2, JDR3, JDR4, DIFSEL, CALFACT,
 ];
+
+/// Commands under way, of the control register.
+const CONVERTS: u32 = bits(&[cr::ADSTART, cr::JADSTART]);
 
 #[derive(Clone, Debug)]
 pub(super) struct Converter {
     pub(super) registers: Registers,
-    pub(super) control: u32,
-    pub(super) flags: u32,
-    pub(super) data: u32,
     /// Cycle at which the current calibration or conversion is done.
     pub(super) done: u64,
     /// The current injected conversion: rank, and cycle at which it is done.
     pub(super) injected: Option<(usize, u64)>,
-    pub(super) injected_data: [u32; 4],
     /// Cycles at which the regulator has started, a rest after the calibration is over, and the
     /// converter is ready; never while it is off.
     pub(super) regulated: u64,
     pub(super) rested: u64,
     pub(super) ready: u64,
     pub(super) calibrated: bool,
-    pub(super) broken: Option<Rule>,
 }
 
 impl Converter {
     pub(super) fn new() -> Self {
         Self {
-            registers: Registers::new(&REGISTERS, &[JSQR], &[0xA0, 0xA4]),
-            control: DEEP,
-            flags: 0,
-            data: 0,
+            registers: Registers::of(ADC1, &WHOLE, &[], &[AWD2CR, AWD3CR]),
             done: u64::MAX,
             injected: None,
-            injected_data: [0; 4],
             regulated: u64::MAX,
             rested: 0,
             ready: u64::MAX,
             calibrated: false,
-            broken: None,
         }
     }
 
-    pub(super) const fn is_enabled(&self) -> bool {
-        self.control & ENABLE != 0
+    pub(super) fn is_enabled(&self) -> bool {
+        self.registers.has(cr::ADEN)
     }
 
-    pub(super) const fn converts(&self) -> bool {
-        self.control & (START | INJECT) != 0
+    fn converts(&self) -> bool {
+        self.registers.get(CR) & CONVERTS != 0
     }
 
     /// The rule that these commands would break.
-    pub(super) fn broken_command(&self, ones: u32, clock: u64, now: u64) -> Option<Rule> {
-        let enabling = ones & ENABLE != 0 && !self.is_enabled();
-        let calibrating = ones & CALIBRATE != 0;
-        let starting = ones & (START | INJECT) & !self.control != 0;
+    fn broken_command(&self, ones: u32, clock: u64, now: u64) -> Option<Rule> {
+        let enabling = cr::ADEN.is_in(ones) && !self.is_enabled();
+        let calibrating = cr::ADCAL.is_in(ones);
+        let starting = ones & CONVERTS & !self.registers.get(CR) != 0;
         if (enabling || calibrating) && now < self.regulated {
             Some(Rule::AdcRegulator)
         } else if calibrating && self.is_enabled() || enabling && !self.calibrated {
             Some(Rule::AdcCalibration)
-        } else if enabling && (self.control & CALIBRATE != 0 || now < self.rested) {
+        } else if enabling && (self.registers.has(cr::ADCAL) || now < self.rested) {
             Some(Rule::AdcEnable)
         } else if starting && (!self.is_enabled() || now < self.ready) {
             Some(Rule::AdcReady)
-        } else if ones & DISABLE != 0 && self.converts() {
+        } else if cr::ADDIS.is_in(ones) && self.converts() {
             Some(Rule::AdcDisable)
         } else if starting && HZ / clock > HIGHEST_CLOCK {
             Some(Rule::AdcClock)
@@ -126,38 +84,36 @@ impl Converter {
     }
 
     /// Writes to a configuration register.
-    pub(super) fn configure(&mut self, offset: u32, write: Write) -> Option<()> {
-        let old = self.registers.read(offset)?;
+    pub(super) fn configure(&mut self, offset: u32, write: Write) -> Result<(), Why> {
+        let old = self.registers.read(offset).ok_or(Why::NoModel)?;
         let changes = write.onto(old) != old;
-        self.broken = match offset {
+        let broken = match offset {
+            DR | JDR1..=JDR4 => return Err(Why::NoModel),
             // The queue of injected conversions is not written while they run.
-            JSQR if changes && self.control & INJECT != 0 => Some(Rule::AdcConfiguration),
+            JSQR if changes && self.registers.has(cr::JADSTART) => Some(Rule::AdcConfiguration),
             // Interrupts, the queue and calibration factors have rules of their own.
-            0x04 | JSQR | 0xB4 => None,
-            0xB0 if changes && self.is_enabled() => Some(Rule::AdcDisabledOnly),
+            IER | JSQR | CALFACT => None,
+            DIFSEL if changes && self.is_enabled() => Some(Rule::AdcDisabledOnly),
             _ if changes && self.converts() => Some(Rule::AdcConfiguration),
             _ => None,
         };
-        if self.broken.is_some() { Some(()) } else { self.registers.write(offset, write) }
+        broken.map_or_else(|| self.registers.write(offset, write), |rule| Err(Why::Broken(rule)))
     }
 
     /// Channel of the regular conversion, or of the injected one of this rank.
     pub(super) fn channel(&self, rank: Option<usize>) -> u32 {
-        match rank {
-            None => self.registers.get(SQR1) >> 6 & 0x1F,
-            Some(rank) => self.registers.get(JSQR) >> (9 + 6 * rank) & 0x1F,
-        }
+        const INJECTED: [Field; 4] = [jsqr::JSQ1, jsqr::JSQ2, jsqr::JSQ3, jsqr::JSQ4];
+        self.registers.field(rank.map_or(sqr1::SQ1, |rank| INJECTED[rank]))
     }
 
     /// Whether a code is made of several conversions.
     pub(super) fn is_oversampled(&self, rank: Option<usize>) -> bool {
-        let bit = if rank.is_some() { INJECTED_OVERSAMPLED } else { OVERSAMPLED };
-        self.registers.get(CFGR2) & bit != 0
+        self.registers.has(if rank.is_some() { cfgr2::JOVSE } else { cfgr2::ROVSE })
     }
 
     /// Conversions that make one code.
     pub(super) fn ratio(&self, rank: Option<usize>) -> u64 {
-        if self.is_oversampled(rank) { 2 << (self.registers.get(CFGR2) >> 2 & 7) } else { 1 }
+        if self.is_oversampled(rank) { 2 << self.registers.field(cfgr2::OVSR) } else { 1 }
     }
 
     /// Half clocks of the converter that one conversion into 12 bits takes: sampling and
@@ -179,134 +135,126 @@ impl Converter {
     /// The noise at a real pin exceeds a step of 12 bits, so that the mean of many conversions
     /// has a finer resolution; here the sum is exact to one part of 2^16.
     pub(super) fn code(&self, rank: Option<usize>, sixteen: u16) -> u32 {
-        let setting = self.registers.get(CFGR2);
         let sum = u64::from(sixteen) * self.ratio(rank) / 16;
-        let shift = if self.is_oversampled(rank) { setting >> 5 & 0xF } else { 0 };
+        let shift = if self.is_oversampled(rank) { self.registers.field(cfgr2::OVSS) } else { 0 };
         (sum >> shift) as u32 & 0xFFFF
     }
 
-    pub(super) fn write_control(&mut self, write: Write, clock: u64, now: u64) -> Option<()> {
+    pub(super) fn write_control(&mut self, write: Write, clock: u64, now: u64) -> Result<(), Why> {
         let ones = write.ones();
-        let known = ENABLE | DISABLE | START | INJECT | STOP | REGULATOR | DEEP | 1 << 30;
-        if ones & !(known | CALIBRATE) != 0 {
-            return None;
+        let command = |field: Field| field.is_in(ones);
+        // Stopping injected conversions is not modelled.
+        if command(cr::JADSTP) {
+            return Err(Why::NoModel);
         }
-        self.broken = self.broken_command(ones, clock, now);
-        if self.broken.is_some() {
-            return Some(());
+        if let Some(rule) = self.broken_command(ones, clock, now) {
+            return Err(Why::Broken(rule));
         }
-        let level = REGULATOR | DEEP | 1 << 30;
-        self.control = self.control & !level | write.onto(self.control) & level;
-        if self.control & DEEP != 0 {
+        let levels = bits(&[cr::ADVREGEN, cr::DEEPPWD, cr::ADCALDIF]);
+        self.registers.write(CR, Write { mask: write.mask & levels, ..write })?;
+        if self.registers.has(cr::DEEPPWD) {
             self.calibrated = false;
         }
-        if self.control & (REGULATOR | DEEP) != REGULATOR {
+        let ready = self.registers.has(cr::ADVREGEN) && !self.registers.has(cr::DEEPPWD);
+        if !ready {
             self.regulated = u64::MAX;
         } else if self.regulated == u64::MAX {
             self.regulated = now + REGULATOR_START;
         }
-        let ready = self.control & REGULATOR != 0 && self.control & DEEP == 0;
-        let idle = self.control & (START | INJECT | CALIBRATE) == 0;
-        if ones & CALIBRATE != 0 && ready && self.control & ENABLE == 0 {
-            self.control |= CALIBRATE;
+        let idle = !self.converts() && !self.registers.has(cr::ADCAL);
+        if command(cr::ADCAL) && ready && !self.is_enabled() {
+            self.registers.put(cr::ADCAL, 1);
             self.done = now + CALIBRATION * clock;
         }
-        if ones & ENABLE != 0 && ready && idle && !self.is_enabled() {
-            self.control |= ENABLE;
+        if command(cr::ADEN) && ready && idle && !self.is_enabled() {
+            self.registers.put(cr::ADEN, 1);
             self.ready = now + STABILISATION * clock;
         }
-        if ones & DISABLE != 0 && idle {
-            self.control &= !ENABLE;
+        if command(cr::ADDIS) && idle {
+            self.registers.put(cr::ADEN, 0);
             self.ready = u64::MAX;
         }
-        if ones & STOP != 0 {
-            self.control &= !START;
+        if command(cr::ADSTP) {
+            self.registers.put(cr::ADSTART, 0);
             self.done = u64::MAX;
         }
-        if ones & START != 0 && self.control & ENABLE != 0 && idle {
+        if command(cr::ADSTART) && self.is_enabled() && idle {
             // A sequence of several, or started by hardware, is not modelled.
-            let (sequence, config) = (self.registers.get(SQR1), self.registers.get(CFGR));
-            if sequence & 0xF != 0 || config & (3 << 10 | 3 << 3) != 0 {
-                return None;
+            if [sqr1::L, cfgr::EXTEN, cfgr::RES].iter().any(|field| self.registers.has(*field)) {
+                return Err(Why::NoModel);
             }
-            self.control |= START;
+            self.registers.put(cr::ADSTART, 1);
             self.done = now + self.cycles(None, clock);
         }
-        if ones & INJECT != 0 && self.control & (ENABLE | INJECT) == ENABLE {
+        if command(cr::JADSTART) && self.is_enabled() && !self.registers.has(cr::JADSTART) {
             // Between regular ones, or started by hardware, is not modelled.
-            if !idle || self.registers.get(JSQR) & (3 << 7) != 0 {
-                return None;
+            if !idle || self.registers.has(jsqr::JEXTEN) {
+                return Err(Why::NoModel);
             }
-            self.control |= INJECT;
+            self.registers.put(cr::JADSTART, 1);
             self.injected = Some((0, now + self.cycles(Some(0), clock)));
         }
-        Some(())
+        Ok(())
     }
 
     pub(super) fn read(&mut self, offset: u32, now: u64) -> Option<u32> {
         self.settle(now);
-        match offset {
-            ISR => Some(self.flags),
-            CR => Some(self.control),
-            DR => {
-                self.flags &= !END;
-                Some(self.data)
-            }
-            JDR..=0x8C => self.injected_data.get((offset - JDR) as usize / 4).copied(),
-            _ => self.registers.read(offset),
+        if offset == DR {
+            self.registers.put(isr::EOC, 0);
         }
+        self.registers.read(offset)
     }
 
     /// Sets `ADRDY` once, when the converter has become ready.
-    pub(super) const fn settle(&mut self, now: u64) {
+    pub(super) fn settle(&mut self, now: u64) {
         if self.ready <= now && self.ready != 0 {
             self.ready = 0;
-            self.flags |= READY;
+            self.registers.put(isr::ADRDY, 1);
         }
     }
 
     /// The injected conversion of this rank is done, with this at its channel.
     pub(super) fn finish_injected(&mut self, rank: usize, done: u64, voltage: u16, clock: u64) {
-        self.injected_data[rank] = self.code(Some(rank), voltage);
-        self.flags |= INJECTED;
-        let last = self.registers.get(JSQR) as usize & 3;
-        if rank < last {
+        self.registers.set(JDR1 + 4 * rank as u32, self.code(Some(rank), voltage));
+        self.registers.put(isr::JEOC, 1);
+        if rank < self.registers.field(jsqr::JL) as usize {
             self.injected = Some((rank + 1, done + self.cycles(Some(rank + 1), clock)));
         } else {
             self.injected = None;
-            self.control &= !INJECT;
-            self.flags |= INJECTED_SEQUENCE;
+            self.registers.put(cr::JADSTART, 0);
+            self.registers.put(isr::JEOS, 1);
         }
     }
 
     /// The current calibration or conversion is done, with this voltage at its channel.
     pub(super) fn finish(&mut self, voltage: u16, clock: u64) {
         let done = std::mem::replace(&mut self.done, u64::MAX);
-        if self.control & CALIBRATE != 0 {
-            self.control &= !CALIBRATE;
+        if self.registers.has(cr::ADCAL) {
+            self.registers.put(cr::ADCAL, 0);
             self.calibrated = true;
             self.rested = done + REST * clock;
             return;
         }
-        let config = self.registers.get(CFGR);
-        if config & CONTINUOUS != 0 {
+        if self.registers.has(cfgr::CONT) {
             self.done = done + self.cycles(None, clock);
         } else {
-            self.control &= !START;
+            self.registers.put(cr::ADSTART, 0);
         }
-        if self.flags & END != 0 {
-            self.flags |= OVERRUN;
-            // Without `OVRMOD` the old code is kept.
-            if config & OVERWRITE == 0 {
+        if self.registers.has(isr::EOC) {
+            self.registers.put(isr::OVR, 1);
+            // The old code is kept.
+            if !self.registers.has(cfgr::OVRMOD) {
                 return;
             }
         }
-        self.data = self.code(None, voltage);
-        self.flags |= END | END_OF_SEQUENCE;
+        self.registers.set(DR, self.code(None, voltage));
+        self.registers.put(isr::EOC, 1);
+        self.registers.put(isr::EOS, 1);
     }
 
     /// Whether it requests DMA; after an overrun not until the flag is cleared.
-    pub(super) const fn wants_dma(&self, config: u32) -> bool {
-        config & DMA != 0 && self.flags & (END | OVERRUN) == END
+    pub(super) fn wants_dma(&self) -> bool {
+        let has = |field| self.registers.has(field);
+        has(cfgr::DMAEN) && has(isr::EOC) && !has(isr::OVR)
     }
 }

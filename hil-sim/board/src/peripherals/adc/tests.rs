@@ -1,10 +1,13 @@
 use super::converter::*;
 use super::*;
+use crate::chip::description::{adc1::*, bits};
+use crate::peripherals::tests::write;
 
-const ALL: u32 = u32::MAX;
+/// The regulator, as each command keeps it.
+const REGULATOR: u32 = cr::ADVREGEN.mask;
 
-fn write(adc: &mut Adc, offset: u32, value: u32, now: u64) -> Option<()> {
-    adc.write(offset, Write { value, mask: ALL }, now)
+fn take(adc: &mut Adc, offset: u32, value: u32, now: u64) -> Result<(), Why> {
+    adc.write(offset, Write { value, mask: u32::MAX }, now)
 }
 
 /// A cycle after which a converter that was started at cycle 0 is ready.
@@ -12,35 +15,35 @@ const BEGIN: u64 = 5_000;
 
 /// Regulator, calibration, enabling, each in its time.
 fn start(adc: &mut Adc, base: u32) {
-    write(adc, base + CR, REGULATOR, 0).expect("modelled");
-    write(adc, base + CR, REGULATOR | CALIBRATE, REGULATOR_START).expect("modelled");
+    write(adc, base + CR, REGULATOR, 0);
+    write(adc, base + CR, REGULATOR | cr::ADCAL.mask, REGULATOR_START);
     adc.advance(adc.deadline());
     let rested = REGULATOR_START + (CALIBRATION + REST) * adc.clock();
-    write(adc, base + CR, REGULATOR | ENABLE, rested).expect("modelled");
-    assert_eq!(adc.take_broken_rule(), None);
+    write(adc, base + CR, REGULATOR | cr::ADEN.mask, rested);
     let flags = adc.read(base + ISR, BEGIN).expect("modelled");
-    assert_eq!(flags & READY, READY);
+    assert!(isr::ADRDY.is_in(flags));
 }
 
 /// ADC2 on channel 9, 256 conversions of 12.5 + 12.5 clocks at a quarter of the
 /// core's, DMA on.
 fn ready() -> Adc {
     let mut adc = Adc::default();
-    write(&mut adc, CCR, 2 << 18, 0).expect("modelled");
+    write(&mut adc, CCR, 2 << 18, 0);
     start(&mut adc, 0x100);
     for (offset, value) in
         [(0x100 + CFGR, 1), (0x100 + CFGR2, 0x9D), (0x100 + SMPR1, 2 << 27), (0x100 + SQR1, 9 << 6)]
     {
-        write(&mut adc, offset, value, BEGIN).expect("modelled");
+        write(&mut adc, offset, value, BEGIN);
     }
     adc
 }
 
+/// Without oversampling it has twelve bits.
 #[test]
 fn a_code_is_the_mean_of_its_conversions_and_takes_their_time() {
     let mut adc = ready();
     adc.set_input(1, 9, 51_234);
-    write(&mut adc, 0x100 + CR, REGULATOR | START, BEGIN).expect("modelled");
+    write(&mut adc, 0x100 + CR, REGULATOR | cr::ADSTART.mask, BEGIN);
     let due = BEGIN + 256 * 25 * 4;
     assert_eq!(adc.deadline(), due);
     adc.advance(due - 1);
@@ -49,16 +52,10 @@ fn a_code_is_the_mean_of_its_conversions_and_takes_their_time() {
     assert!(adc.wants_dma(1) && !adc.wants_dma(0));
     assert_eq!(adc.read(0x100 + DR, due), Some(51_234));
     assert!(!adc.wants_dma(1));
-}
-
-#[test]
-fn without_oversampling_there_are_twelve_bits() {
-    let mut adc = ready();
-    write(&mut adc, 0x100 + CFGR2, 0, 0).expect("modelled");
-    adc.set_input(1, 9, 51_234);
-    write(&mut adc, 0x100 + CR, REGULATOR | START, BEGIN).expect("modelled");
+    write(&mut adc, 0x100 + CFGR2, 0, due);
+    write(&mut adc, 0x100 + CR, REGULATOR | cr::ADSTART.mask, due);
     adc.advance(adc.deadline());
-    assert_eq!(adc.read(0x100 + DR, 0), Some(51_234 / 16));
+    assert_eq!(adc.read(0x100 + DR, due), Some(51_234 / 16));
 }
 
 #[test]
@@ -66,18 +63,18 @@ fn a_code_that_is_not_read_is_kept_and_the_next_is_lost() {
     let mut adc = ready();
     for code in [1600, 3200] {
         adc.set_input(1, 9, code);
-        write(&mut adc, 0x100 + CR, REGULATOR | START, BEGIN).expect("modelled");
+        write(&mut adc, 0x100 + CR, REGULATOR | cr::ADSTART.mask, BEGIN);
         adc.advance(adc.deadline());
     }
-    assert_eq!(adc.read(0x100 + ISR, 0).map(|flags| flags & OVERRUN), Some(OVERRUN));
+    assert_eq!(adc.read(0x100 + ISR, 0).map(|flags| isr::OVR.of(flags)), Some(1));
     assert_eq!(adc.read(0x100 + DR, 0), Some(1600));
 }
 
 #[test]
 fn without_end_one_code_follows_the_other() {
     let mut adc = ready();
-    write(&mut adc, 0x100 + CFGR, DMA | CONTINUOUS, 0).expect("modelled");
-    write(&mut adc, 0x100 + CR, REGULATOR | START, BEGIN).expect("modelled");
+    write(&mut adc, 0x100 + CFGR, bits(&[cfgr::DMAEN, cfgr::CONT]), 0);
+    write(&mut adc, 0x100 + CR, REGULATOR | cr::ADSTART.mask, BEGIN);
     for round in 1..4 {
         let due = BEGIN + round * 256 * 25 * 4;
         assert_eq!(adc.deadline(), due);
@@ -86,72 +83,61 @@ fn without_end_one_code_follows_the_other() {
         adc.advance(due + 17);
         assert_eq!(adc.read(0x100 + DR, due), Some(100 * round as u32));
     }
-    write(&mut adc, 0x100 + CR, REGULATOR | STOP, 90_000).expect("modelled");
+    write(&mut adc, 0x100 + CR, REGULATOR | cr::ADSTP.mask, 90_000);
     assert_eq!(adc.deadline(), u64::MAX);
 }
 
 #[test]
 fn after_an_overrun_it_requests_dma_only_when_the_flag_is_cleared() {
     let mut adc = ready();
-    write(&mut adc, 0x100 + CFGR, DMA | CONTINUOUS, 0).expect("modelled");
-    write(&mut adc, 0x100 + CR, REGULATOR | START, BEGIN).expect("modelled");
+    write(&mut adc, 0x100 + CFGR, bits(&[cfgr::DMAEN, cfgr::CONT]), 0);
+    write(&mut adc, 0x100 + CR, REGULATOR | cr::ADSTART.mask, BEGIN);
     adc.advance(adc.deadline());
     assert!(adc.wants_dma(1));
     adc.advance(adc.deadline());
     assert!(!adc.wants_dma(1));
-    write(&mut adc, 0x100 + ISR, OVERRUN, 0).expect("modelled");
+    write(&mut adc, 0x100 + ISR, isr::OVR.mask, 0);
     assert!(adc.wants_dma(1));
-}
-
-#[test]
-fn calibration_wants_the_regulator_and_its_time() {
-    let mut adc = Adc::default();
-    write(&mut adc, CR, CALIBRATE | DEEP, 0).expect("modelled");
-    assert_eq!(adc.read(CR, 0).map(|control| control & CALIBRATE), Some(0));
-    write(&mut adc, CR, REGULATOR, 0).expect("modelled");
-    write(&mut adc, CR, REGULATOR | CALIBRATE, BEGIN).expect("modelled");
-    assert_eq!(adc.deadline(), BEGIN + CALIBRATION);
-    adc.advance(BEGIN + CALIBRATION);
-    assert_eq!(adc.read(CR, 0), Some(REGULATOR));
 }
 
 #[test]
 fn injected_conversions_follow_one_another_into_registers_of_their_own() {
     let mut adc = Adc::default();
-    write(&mut adc, CCR, 2 << 18, 0).expect("modelled");
+    write(&mut adc, CCR, 2 << 18, 0);
     start(&mut adc, 0);
     for (offset, value) in [
-        (CFGR2, 8 << 5 | 7 << 2 | INJECTED_OVERSAMPLED),
+        (CFGR2, 8 << 5 | 7 << 2 | cfgr2::JOVSE.mask),
         (SMPR1, 2 << 3),
-        (SMPR1 + 4, 2 << 6),
+        (SMPR2, 2 << 6),
         (JSQR, 12 << 9 | 1 << 15 | 1),
     ] {
-        write(&mut adc, offset, value, 0).expect("modelled");
+        write(&mut adc, offset, value, 0);
     }
     adc.set_input(0, 12, 4095 << 4);
     adc.set_input(0, 1, 1234 << 4);
-    write(&mut adc, CR, REGULATOR | INJECT, BEGIN).expect("modelled");
+    write(&mut adc, CR, REGULATOR | cr::JADSTART.mask, BEGIN);
     let each = 256 * 25 * 4;
     assert_eq!(adc.deadline(), BEGIN + each);
     adc.advance(BEGIN + each);
-    let flags = |adc: &mut Adc| adc.read(ISR, 0).map(|f| f & (INJECTED | INJECTED_SEQUENCE));
-    assert_eq!(flags(&mut adc), Some(INJECTED));
+    let (one, all) = (isr::JEOC.mask, isr::JEOS.mask);
+    let flags = |adc: &mut Adc| adc.read(ISR, 0).map(|flags| flags & (one | all));
+    assert_eq!(flags(&mut adc), Some(one));
     adc.advance(adc.deadline());
-    assert_eq!(flags(&mut adc), Some(INJECTED | INJECTED_SEQUENCE));
-    assert_eq!((adc.read(JDR, 0), adc.read(JDR + 4, 0)), (Some(4095), Some(1234)));
-    assert_eq!(adc.read(CR, 0).map(|control| control & INJECT), Some(0));
+    assert_eq!(flags(&mut adc), Some(one | all));
+    assert_eq!((adc.read(JDR1, 0), adc.read(JDR2, 0)), (Some(4095), Some(1234)));
+    assert_eq!(adc.read(CR, 0).map(|word| cr::JADSTART.of(word)), Some(0));
     assert_eq!(adc.deadline(), u64::MAX);
-    write(&mut adc, ISR, INJECTED_SEQUENCE, 0).expect("modelled");
-    assert_eq!(flags(&mut adc), Some(INJECTED));
+    write(&mut adc, ISR, all, 0);
+    assert_eq!(flags(&mut adc), Some(one));
     // Beside regular ones they are not modelled.
-    write(&mut adc, CFGR, CONTINUOUS, 0).expect("modelled");
-    write(&mut adc, CR, REGULATOR | START, BEGIN).expect("modelled");
-    assert_eq!(write(&mut adc, CR, REGULATOR | INJECT, BEGIN), None);
+    write(&mut adc, CFGR, cfgr::CONT.mask, 0);
+    write(&mut adc, CR, REGULATOR | cr::ADSTART.mask, BEGIN);
+    assert_eq!(take(&mut adc, CR, REGULATOR | cr::JADSTART.mask, BEGIN), Err(Why::NoModel));
 }
 
 #[test]
 fn a_sequence_is_not_modelled() {
     let mut adc = ready();
-    write(&mut adc, 0x100 + SQR1, 9 << 6 | 1, 0).expect("modelled");
-    assert_eq!(write(&mut adc, 0x100 + CR, REGULATOR | START, BEGIN), None);
+    write(&mut adc, 0x100 + SQR1, 9 << 6 | 1, 0);
+    assert_eq!(take(&mut adc, 0x100 + CR, REGULATOR | cr::ADSTART.mask, BEGIN), Err(Why::NoModel));
 }

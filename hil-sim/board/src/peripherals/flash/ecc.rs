@@ -9,16 +9,10 @@
 use std::collections::BTreeMap;
 
 use super::{BANK_BYTES, BASE, Change, Flash, Write};
+use crate::chip::description::{Field, bits, flash::eccr};
 
 /// Bytes that are corrected together.
 const WORD: u32 = 8;
-
-/// Of the ECC register: two wrong bits in a double word were read, or one, which was corrected;
-/// bank and place of the double word; the interrupt for one.
-pub(super) const TWO: u32 = 1 << 31;
-const ONE: u32 = 1 << 30;
-pub(super) const BANK: u32 = 1 << 21;
-const ONE_INTERRUPT: u32 = 1 << 24;
 
 /// How many bits of a double word are wrong.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -51,24 +45,24 @@ impl Ecc {
 
     /// An access to its register.
     pub(super) const fn write(&mut self, write: Write) {
-        let interrupt = write.onto(self.register) & ONE_INTERRUPT;
-        self.register &= !(write.ones() & (TWO | ONE)) & !ONE_INTERRUPT;
-        self.register |= interrupt;
+        let interrupt = write.onto(self.register) & eccr::ECCIE.mask;
+        let cleared = write.ones() & bits(&[eccr::ECCD, eccr::ECCC]);
+        self.register = self.register & !cleared & !eccr::ECCIE.mask | interrupt;
     }
 
     /// Bits were found wrong in the double word at this address; the first report stays until it
     /// is cleared.
     fn report(&mut self, address: u32, wrong: Wrong) {
-        if self.register & TWO != 0 || wrong == Wrong::One && self.register & ONE != 0 {
+        let corrected = wrong == Wrong::One;
+        let has = |field: Field| field.is_in(self.register);
+        if has(eccr::ECCD) || corrected && has(eccr::ECCC) {
             return;
         }
-        let (bank, place) = match address - BASE {
-            offset if offset < BANK_BYTES => (0, offset),
-            offset => (BANK, offset - BANK_BYTES),
-        };
-        let flag = if wrong == Wrong::One { ONE } else { TWO };
-        self.register &= ONE_INTERRUPT | ONE;
-        self.register |= flag | bank | (place / WORD);
+        let offset = address - BASE;
+        let place = eccr::BK_ECC.at(offset / BANK_BYTES) | (offset % BANK_BYTES / WORD);
+        let flag = if corrected { eccr::ECCC } else { eccr::ECCD };
+        self.register &= bits(&[eccr::ECCIE, eccr::ECCC]);
+        self.register |= flag.mask | place;
     }
 }
 
@@ -95,16 +89,16 @@ impl Flash {
         let from = address & !(WORD - 1);
         let found = self.ecc.words.range(from..address.saturating_add(size));
         let found: Vec<(u32, Wrong)> = found.map(|(at, wrong)| (*at, *wrong)).collect();
-        let before = self.ecc.register & TWO;
+        let before = self.has_two_wrong_bits();
         for (at, wrong) in found {
             self.ecc.report(at, wrong);
         }
-        self.ecc.register & TWO != before
+        self.has_two_wrong_bits() != before
     }
 
     /// Whether two wrong bits are reported and not yet cleared.
     pub const fn has_two_wrong_bits(&self) -> bool {
-        self.ecc.register & TWO != 0
+        eccr::ECCD.is_in(self.ecc.register)
     }
 
     /// A change of the memory is done.

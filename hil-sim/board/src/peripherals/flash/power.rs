@@ -24,11 +24,6 @@ impl Flash {
         });
     }
 
-    /// Operations begun so far.
-    pub const fn begun(&self) -> u64 {
-        self.begun
-    }
-
     /// Cycle at which an operation from `now` to `due` ends or is interrupted.
     pub(super) fn cut_short(&self, due: u64, now: u64) -> u64 {
         if self.cuts_current() { now + (due - now) / 2 } else { due }

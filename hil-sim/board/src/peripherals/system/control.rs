@@ -1,12 +1,13 @@
 //! The system control block: vectors, faults and their status, reset by software.
 
 use super::Write;
+use crate::chip::Why;
 use crate::core::Fault;
 use crate::exceptions::Exceptions;
 use crate::exceptions::number::{
     BUS_FAULT, HARD_FAULT, MEM_MANAGE, PEND_SV, SYS_TICK, USAGE_FAULT,
 };
-use crate::peripherals::registers::{Kept, Registers};
+use crate::peripherals::registers::Registers;
 
 const CPUID: u32 = 0xD00;
 const ICSR: u32 = 0xD04;
@@ -56,14 +57,23 @@ impl Cause {
     }
 }
 
-/// Registers that keep what is written.
-const REGISTERS: [Kept; 6] = [
-    Kept { offset: CPUID, reset: 0x410F_C241, mask: 0 },
-    Kept { offset: VTOR, reset: 0, mask: !0x7F },
-    Kept { offset: SCR, reset: 0, mask: 0x16 },
-    Kept { offset: CCR, reset: 0x200, mask: u32::MAX },
-    Kept { offset: SHCSR, reset: 0, mask: 0x7 << 16 },
-    Kept { offset: FPCCR, reset: 0xC000_0000, mask: u32::MAX },
+/// Registers that keep what is written: values after reset, and bits that can be changed. The
+/// engine does not report the address of a fault. The status of debug events is cleared by a probe
+/// whenever it asks for the core's status (probe-rs 0.32, armv7m.rs).
+const REGISTERS: [(u32, u32, u32); 13] = [
+    (CPUID, 0x410F_C241, 0),
+    (VTOR, 0, !0x7F),
+    (SCR, 0, 0x16),
+    (CCR, 0x200, u32::MAX),
+    (SHCSR, 0, 0x7 << 16),
+    (DFSR, 0, 0),
+    (MMFAR, 0, 0),
+    (BFAR, 0, 0),
+    (AFSR, 0, 0),
+    (CPACR, 0, u32::MAX),
+    (DEMCR, 0, u32::MAX),
+    (FPCCR, 0xC000_0000, u32::MAX),
+    (FPDSCR, 0, u32::MAX),
 ];
 
 /// The system control block.
@@ -79,10 +89,10 @@ pub struct Control {
 
 impl Control {
     pub(super) fn new(vectors: u32) -> Self {
-        // The engine does not report the address of a fault. The status of debug events is cleared
-        // by a probe whenever it asks for the core's status (probe-rs 0.32, armv7m.rs).
-        let zeros = [DFSR, MMFAR, BFAR, AFSR];
-        let mut registers = Registers::new(&REGISTERS, &[CPACR, DEMCR, FPDSCR], &zeros);
+        let mut registers = Registers::default();
+        for (offset, reset, mask) in REGISTERS {
+            registers.add(offset, reset, mask);
+        }
         registers.set(VTOR, vectors);
         Self { registers, faults: 0, hard: 0, wants_reset: false }
     }
@@ -143,7 +153,7 @@ impl Control {
         write: Write,
         exceptions: &mut Exceptions,
         now: u64,
-    ) -> Option<()> {
+    ) -> Result<(), Why> {
         match offset {
             ICSR => {
                 for (bit, number) in [(28, PEND_SV), (26, SYS_TICK)] {
@@ -163,10 +173,10 @@ impl Control {
             CFSR => self.faults &= !write.ones(),
             HFSR => self.hard &= !write.ones(),
             DFSR => {}
-            CPUID | MMFAR | BFAR | AFSR => return None,
+            CPUID | MMFAR | BFAR | AFSR => return Err(Why::NoModel),
             _ => self.registers.write(offset, write)?,
         }
-        Some(())
+        Ok(())
     }
 }
 
@@ -183,25 +193,16 @@ mod tests {
     }
 
     #[test]
-    fn a_fault_without_a_handler_becomes_a_hard_fault() {
-        let (mut control, exceptions) = (Control::new(0), Exceptions::default());
+    fn a_fault_takes_its_handler_or_the_hard_fault_or_locks_up() {
+        let (mut control, mut exceptions) = (Control::new(0), Exceptions::default());
         assert_eq!(control.fault(UNDEFINED, &exceptions, false), Some(HARD_FAULT));
         assert_eq!((control.faults, control.hard), (1 << 16, 1 << 30));
-    }
-
-    #[test]
-    fn a_fault_with_a_handler_takes_it_unless_an_equally_urgent_one_runs() {
-        let (mut control, mut exceptions) = (Control::new(0), Exceptions::default());
         write(&mut control, &mut exceptions, SHCSR, 7 << 16);
         assert_eq!(control.fault(UNDEFINED, &exceptions, false), Some(USAGE_FAULT));
         assert_eq!(control.fault(UNDEFINED, &exceptions, true), Some(HARD_FAULT));
+        // An equally urgent one runs.
         exceptions.enter(INTERRUPT);
         assert_eq!(control.fault(UNDEFINED, &exceptions, false), Some(HARD_FAULT));
-    }
-
-    #[test]
-    fn a_fault_inside_the_hard_fault_locks_up() {
-        let (mut control, mut exceptions) = (Control::new(0), Exceptions::default());
         exceptions.enter(HARD_FAULT);
         assert_eq!(control.fault(UNDEFINED, &exceptions, false), None);
     }

@@ -4,6 +4,7 @@
 //! Source: ARMv7-M Architecture Reference Manual, B3.5.
 
 use super::super::Write;
+use crate::chip::Why;
 
 const TYPE: u32 = 0xD90;
 const CTRL: u32 = 0xD94;
@@ -45,12 +46,12 @@ impl Mpu {
         })
     }
 
-    pub(super) fn write(&mut self, offset: u32, write: Write) -> Option<()> {
+    pub(super) fn write(&mut self, offset: u32, write: Write) -> Result<(), Why> {
         let value = write.value;
         match offset {
             // On, it lets the default map through; nothing else is modelled.
             CTRL if value & ENABLE != 0 && value & (DEFAULT_MAP | IN_FAULTS) != DEFAULT_MAP => {
-                return None;
+                return Err(Why::NoModel);
             }
             CTRL => self.control = value & 7,
             RNR => self.selected = value as usize % REGIONS,
@@ -60,12 +61,14 @@ impl Mpu {
                 }
                 self.regions[self.selected].0 = value & !0x1F;
             }
-            RASR if value & 1 != 0 && value & (ACCESS | SUBREGIONS) != 0 => return None,
+            RASR if value & 1 != 0 && value & (ACCESS | SUBREGIONS) != 0 => {
+                return Err(Why::NoModel);
+            }
             RASR => self.regions[self.selected].1 = value,
-            _ => return None,
+            _ => return Err(Why::NoModel),
         }
         self.changed = true;
-        Some(())
+        Ok(())
     }
 
     /// Whether [`Mpu::take_change`] has something new.
@@ -87,7 +90,7 @@ impl Mpu {
 mod tests {
     use super::*;
 
-    fn write(mpu: &mut Mpu, offset: u32, value: u32) -> Option<()> {
+    fn write(mpu: &mut Mpu, offset: u32, value: u32) -> Result<(), Why> {
         mpu.write(offset, Write { value, mask: u32::MAX })
     }
 
@@ -107,7 +110,7 @@ mod tests {
     #[test]
     fn what_is_not_modelled_is_refused() {
         let mut mpu = Mpu::default();
-        assert_eq!(write(&mut mpu, CTRL, ENABLE), None, "without the default map");
-        assert_eq!(write(&mut mpu, RASR, 3 << 24 | 1), None, "a region with access");
+        assert_eq!(write(&mut mpu, CTRL, ENABLE), Err(Why::NoModel), "without the default map");
+        assert_eq!(write(&mut mpu, RASR, 3 << 24 | 1), Err(Why::NoModel), "a region with access");
     }
 }

@@ -1,6 +1,7 @@
 //! The core's two counters: the system timer, and the cycle counter of the data watchpoint unit.
 
 use super::super::{Peripheral, Write};
+use crate::chip::Why;
 
 const CSR: u32 = 0x10;
 const RVR: u32 = 0x14;
@@ -62,21 +63,21 @@ impl SysTick {
         })
     }
 
-    pub(super) fn write(&mut self, offset: u32, write: Write, now: u64) -> Option<()> {
+    pub(super) fn write(&mut self, offset: u32, write: Write, now: u64) -> Result<(), Why> {
         let ran = self.runs();
         match offset {
             CSR => self.control = write.onto(self.control) & 7,
             RVR => self.reload = write.onto(self.reload) & 0x00FF_FFFF,
             CVR => self.reached = false,
             CALIB => {}
-            _ => return None,
+            _ => return Err(Why::NoModel),
         }
         if !self.runs() {
             self.zero = u64::MAX;
         } else if !ran || offset == CVR {
             self.zero = now + self.period();
         }
-        Some(())
+        Ok(())
     }
 
     pub(super) fn deadline(&self) -> u64 {
@@ -123,8 +124,8 @@ impl Peripheral for Counter {
         }
     }
 
-    fn write(&mut self, offset: u32, write: Write, now: u64) -> Option<()> {
-        let value = self.read(CYCCNT, now)?;
+    fn write(&mut self, offset: u32, write: Write, now: u64) -> Result<(), Why> {
+        let value = self.read(CYCCNT, now).ok_or(Why::NoModel)?;
         match offset {
             // The unit's features are read-only.
             CTRL if write.ones() & !(1 | 0xFF << 24) == 0 => {
@@ -132,10 +133,10 @@ impl Peripheral for Counter {
                 self.held = value;
             }
             CYCCNT => self.held = write.onto(value),
-            _ => return None,
+            _ => return Err(Why::NoModel),
         }
         self.origin = now.wrapping_sub(u64::from(self.held));
-        Some(())
+        Ok(())
     }
 }
 

@@ -1,0 +1,212 @@
+//! From a rig that nobody knows to one that is accepted, on one emulated board: first power-up, its
+//! parameters to the board, three deployments and the ways back, identification, its parameters to
+//! the board, acceptance. The rig is drawn far beyond its tolerances; the truth judges.
+
+use std::fs::File;
+use std::path::Path;
+use std::time::Duration;
+
+use hil_sim::bringup::{self, Line, Progress, Stdin};
+use hil_sim::identify::accept::{Acceptance, accept};
+use hil_sim::identify::record::Record;
+use hil_sim::identify::result::identify;
+use hil_sim::params::{Client, Store, set_of};
+use hil_sim::plant::draw::PlantParameters;
+use hil_sim::plant::rig::VirtualRig;
+use hil_sim::plant::wall::{Step, Wall};
+use hil_sim::probe::{Port, PortError};
+use hil_sim::record::{Summary, Writer, recordings};
+use hil_sim::scenario::Scenario;
+use hil_sim::testing::long;
+use rig_board::bench::Bench;
+use rig_board::bringup::Attended;
+
+use crate::common::{Board, elf, strings};
+
+/// A rig of this seed, and what is known of it.
+fn hidden(seed: u64) -> Scenario {
+    let wide = include_str!("../../tests/identify/hidden.toml");
+    Scenario::parse("hidden.toml", wide, &[format!("run.seed={seed}")]).expect("a scenario")
+}
+
+/// A board whose plant this is, idle.
+fn board(hidden: &Scenario, plant: Option<PlantParameters>) -> Board {
+    let bench = Bench::new(elf(), strings(), hidden).expect("a bench");
+    let mut board = Board { bench, log: Vec::new(), frames: Vec::new() };
+    if let Some(plant) = plant {
+        board.bench.plant = VirtualRig::new(plant, 0.0, 0.0, 1e-3);
+    }
+    board.until("mode: idle", 3000);
+    board
+}
+
+/// The probe at a board whose log is kept.
+struct Probe<'a>(&'a mut Board);
+
+impl Port for Probe<'_> {
+    fn up(&mut self, channel: u32) -> Result<Vec<u8>, PortError> {
+        if channel == 1 { Ok(Vec::new()) } else { self.0.bench.up(channel) }
+    }
+
+    fn down(&mut self, channel: u32, bytes: &[u8]) -> Result<usize, PortError> {
+        self.0.bench.down(channel, bytes)
+    }
+
+    fn reset(&mut self) -> Result<(), PortError> {
+        self.0.bench.reset()
+    }
+
+    fn memory(&mut self, address: u32, into: &mut [u8]) -> Result<(), PortError> {
+        self.0.bench.memory(address, into)
+    }
+
+    fn pass(&mut self) -> Result<(), PortError> {
+        self.0.step();
+        Ok(())
+    }
+
+    fn now(&self) -> Duration {
+        self.0.bench.now()
+    }
+}
+
+/// Gives the board these parameters, and resets it.
+fn give(board: &mut Board, scenario: &Scenario) {
+    let set = set_of("prototype", &scenario.rig).expect("a set");
+    Client::new(Probe(board)).put(&set).expect("the board takes it");
+    board.bench.reset().expect("resets");
+    board.frames.clear();
+    board.until("mode: idle", 3000);
+}
+
+/// The log of a run by this letter, until the board is in this mode.
+fn run(
+    board: &mut Board,
+    (letter, mode): (u8, &str),
+    known: &Scenario,
+    path: &Path,
+) -> (Record, Summary) {
+    board.send(letter);
+    board.until(mode, 120_000);
+    board.run(100);
+    let bytes = std::mem::take(&mut board.frames);
+    let file = File::create(path).expect("a file");
+    let toml = known.to_toml();
+    let mut writer = Writer::new(Some(file), None::<Vec<u8>>, Some(&toml), false).expect("begins");
+    writer.take(&bytes, &mut |_| {}).expect("takes");
+    writer.finish(&mut |_| {}).expect("ends");
+    let summary = recordings(path).expect("a log").pop().expect("a start").summary;
+    (Record::read(path, None).expect("a log"), summary)
+}
+
+const OUT: (u8, &str) = (b's', "mode: deployed");
+const BACK: (u8, &str) = (b'r', "mode: retracted");
+
+/// Out and back on a board with these parameters.
+fn accepted(board: &mut Board, known: &Scenario, folder: &Path) -> Acceptance {
+    give(board, known);
+    let out = run(board, OUT, known, &folder.join("out.mcap"));
+    give(board, known);
+    let back = run(board, BACK, known, &folder.join("back.mcap"));
+    let (records, runs): (Vec<_>, Vec<_>) = [out, back].into_iter().unzip();
+    accept(&records, &runs, &[]).expect("comparable")
+}
+
+/// What a rig may do after it was identified.
+const CHANGES: [(&str, fn(&mut PlantParameters)); 5] = [
+    ("friction 25 % less", |p| p.mu *= 0.75),
+    ("tread 20 % stiffer", |p| (p.ring.k_inf, p.ring.k_0) = (1.2 * p.ring.k_inf, 1.2 * p.ring.k_0)),
+    ("stowed 2 mm off", |p| p.wall = moved(&p.wall, [2.0; 3])),
+    ("preload scale 10 % off", |p| p.sensors.preload_sensor_gain *= 1.1),
+    ("second step 1 mm off", |p| p.wall = moved(&p.wall, [0.0, 1.0, 0.0])),
+];
+
+fn moved(wall: &Wall, by_mm: [f64; 3]) -> Wall {
+    let steps = wall.steps().iter().zip(by_mm);
+    Wall::new(steps.map(|(s, by)| Step { position_mm: s.position_mm + by, ..*s }).collect())
+}
+
+/// Commissions the rig of a seed; why it fails, if it does.
+fn commission(seed: u64) -> Vec<String> {
+    let hidden = hidden(seed);
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    let folder = if std::env::var("SEED").is_ok() { Path::new("/tmp/com") } else { folder };
+    // First power-up.
+    let bench = Bench::new(elf(), strings(), &hidden).expect("a bench");
+    let mut attended = Attended::new(bench);
+    let mut person = attended.person(Stdin::new(std::io::empty(), std::io::sink(), true));
+    let mut progress = Progress::new(Scenario::default());
+    let mut line = Line::new(&mut attended);
+    bringup::run(&mut line, &mut person, &mut progress, &mut |_| (), &mut |_| ()).expect("ends");
+    let failed: Vec<_> = progress.checks().filter(|check| !check.ok).collect();
+    if !failed.is_empty() {
+        return vec![format!("{failed:?}")];
+    }
+    let mut mine = progress.proposed;
+    assert_eq!(mine.sources.len(), 3, "{:?}", mine.sources);
+    let progress_sources = mine.sources.clone();
+    // Three deployments.
+    let mut at = board(&hidden, None);
+    let usual = mine.rig.preload.cruise_n;
+    let mut records = Vec::new();
+    for part in [1.0, 0.75, 1.25] {
+        mine.rig.preload.cruise_n = part * usual;
+        give(&mut at, &mine);
+        let path = folder.join(format!("{part}.mcap"));
+        records.push(run(&mut at, OUT, &mine, &path).0);
+        at.send(BACK.0);
+        at.until(BACK.1, 120_000);
+    }
+    // Identification.
+    let found = identify(&records, &records[0].scenario).expect("identified");
+    let mine = found.scenario.clone();
+    eprintln!("DBG {:?} {:#?}", progress_sources, found.parameters);
+    let mut wrong = Vec::new();
+    let plant = hidden.plant();
+    for (name, truth) in [
+        ("tread.k_inf_pa_per_m", 1e9 * plant.ring.k_inf),
+        ("tread.stiffening", plant.ring.k_0 / plant.ring.k_inf),
+        ("tread.tau_s", plant.ring.tau_s),
+        ("plant.mu", plant.mu),
+        ("plant.top_load_n", plant.load_n / mine.rig.plant.top_load_share),
+        ("preload.slew_n_per_s", plant.slew_n_per_s),
+        ("preload.spring_n_per_mm", plant.spring_n_per_mm),
+    ] {
+        let of = found.parameter(name).expect(name);
+        let (low, high) = (of.low.unwrap_or(f64::MIN), of.high.unwrap_or(f64::MAX));
+        if !of.identified || !(low..=high).contains(&truth) {
+            wrong.push(format!("{name}: {truth} is not in {low} to {high}"));
+        }
+    }
+    // Acceptance, and not of another rig.
+    wrong.extend(accepted(&mut at, &mine, folder).reasons);
+    let (change, by) = CHANGES[(seed % 5) as usize];
+    let mut plant = plant;
+    by(&mut plant);
+    if accepted(&mut board(&hidden, Some(plant)), &mine, folder).passed {
+        wrong.push(format!("{change}: accepted"));
+    }
+    wrong
+}
+
+#[test]
+fn an_unknown_rig_is_commissioned_and_accepted() {
+    if !long() {
+        return;
+    }
+    if let Ok(seed) = std::env::var("SEED") {
+        let why = commission(seed.parse().unwrap());
+        panic!("{why:#?}");
+    }
+    let half = |first: u64| (0..10).map(move |n| first + 2 * n);
+    let wrong = |seeds| -> Vec<(u64, Vec<String>)> {
+        let each = |seed| Some((seed, commission(seed))).filter(|(_, why)| !why.is_empty());
+        Iterator::filter_map(seeds, each).collect()
+    };
+    let wrong = std::thread::scope(|scope| {
+        let other = scope.spawn(|| wrong(half(1_900_002)));
+        [wrong(half(1_900_001)), other.join().expect("no panic")].concat()
+    });
+    assert!(wrong.len() <= 1, "{wrong:#?}");
+}
