@@ -1,6 +1,7 @@
 //! The firmware, and other images, on the emulated board.
 
 mod bringup;
+mod commissioning;
 mod common;
 mod cycles;
 mod faults;

@@ -3,7 +3,7 @@
 use serde::Serialize;
 use toml::Table;
 
-use super::coordinates::{FRICTION, LOAD, STEPS, STIFFENING, STIFFNESS, TAU};
+use super::coordinates::{FRICTION, LOAD, STIFFENING, STIFFNESS, TAU};
 use super::forward::{CHANNELS, quotient};
 use super::noise::Noise;
 use super::record::Record;
@@ -158,7 +158,8 @@ pub fn brief(value: f64) -> String {
 /// tolerances, as found. The preload is the pre-tightener's as found: its keys are judged.
 fn residuals(found: &Identification, fit: &Fit) -> Result<Vec<Residual>, IdentifyError> {
     let mut x = fit.contact.x.clone();
-    let stated = [STIFFNESS, STIFFENING, TAU, FRICTION, LOAD].into_iter().chain(STEPS..x.len());
+    let stated =
+        [STIFFNESS, STIFFENING, TAU, FRICTION, LOAD].into_iter().chain(fit.coordinates.of_steps());
     for index in stated {
         x[index] = fit.coordinates.priors()[index].mean;
     }

@@ -1,6 +1,8 @@
 //! The coordinates of the fit: logarithms where only the ratio matters, the rest in units of
 //! about their tolerance; and the prior of each.
 
+use std::ops::Range;
+
 use nalgebra::DMatrix;
 
 use crate::plant::draw::PlantParameters;
@@ -49,6 +51,8 @@ const UNKNOWN_HEIGHT_MM: f64 = 0.5;
 /// law, relative: no scenario states them.
 const DRIVE_REL: f64 = 0.01;
 const CREEP_REL: f64 = 0.05;
+/// Deviation of where a run begins that an earlier one has ended, mm: a run arrives within 0.5.
+const START_MM: f64 = 0.25;
 /// Deviation of a coordinate that is stated without tolerance.
 const EXACT: f64 = 1e-6;
 
@@ -123,6 +127,13 @@ impl Coordinates {
         known
     }
 
+    /// Adds the place where a run begins that an earlier one has ended, mm from where it should;
+    /// returns its coordinate.
+    pub fn add_start(&mut self) -> usize {
+        self.priors.push(Prior { mean: 0.0, deviation: START_MM, tolerance: true });
+        self.priors.len() - 1
+    }
+
     /// Number of steps.
     pub const fn steps(&self) -> usize {
         self.steps
@@ -131,6 +142,11 @@ impl Coordinates {
     /// Coordinate of a step's position.
     pub const fn position(&self, step: usize) -> usize {
         STEPS + step
+    }
+
+    /// Coordinates of all steps.
+    pub const fn of_steps(&self) -> Range<usize> {
+        STEPS..STEPS + 2 * self.steps
     }
 
     /// Coordinate of a step's height.

@@ -46,6 +46,9 @@ pub struct Trajectory {
 pub struct Run {
     /// Where it begins, mm.
     start_mm: f64,
+    /// Coordinate of how far that is off, if it begins as an earlier run has ended: pressed, and
+    /// without a latch that carries the load.
+    start: Option<usize>,
     arm_delay: f64,
     compression_delay: f64,
     nominal: PlantParameters,
@@ -74,13 +77,18 @@ pub(super) fn quotient(a: &Channels, b: &Channels, over: f64) -> Channels {
 
 impl Run {
     /// Prepares a record.
-    pub fn of(record: &Record, coordinates: &Coordinates) -> Result<Self, super::IdentifyError> {
+    pub fn of(
+        record: &Record,
+        coordinates: &mut Coordinates,
+    ) -> Result<Self, super::IdentifyError> {
+        let traces = Traces::of(record)?;
         Ok(Self {
             start_mm: record.start_mm(),
+            start: traces.is_loaded().then(|| coordinates.add_start()),
             arm_delay: record.scenario.noise.arm_angle_delay_s / TICK_S,
             compression_delay: record.scenario.noise.compression_sensor_delay_s / TICK_S,
             nominal: coordinates.nominal().clone(),
-            traces: Traces::of(record)?,
+            traces,
             name: record.name.clone(),
         })
     }
@@ -93,7 +101,11 @@ impl Run {
         let radius = plant.ring.radius_mm;
         let gain = x[LOAD_GAIN].exp();
         let preload = |tick: usize| traces.preload_n[tick] / gain;
-        let mut rig = VirtualRig::new(plant, self.start_mm, preload(first), dt_s);
+        let start_mm = self.start_mm + self.start.map_or(0.0, |start| x[start]);
+        let mut rig = VirtualRig::new(plant, start_mm, preload(first), dt_s);
+        if self.start.is_some() {
+            rig = rig.with_speed(0.0);
+        }
         let count = (last - first) / STEP + 1;
         let series = [(); 4].map(|()| Vec::with_capacity(count));
         let mut trajectory =
@@ -261,7 +273,8 @@ pub(crate) fn derivatives(
         moved[index] += by;
         quotient(&run.predicted(base, &moved), &predicted, by)
     };
-    let mut columns = vec![Channels::default(); x.len()];
+    let none = quotient(&predicted, &predicted, 1.0);
+    let mut columns = vec![none.clone(); x.len()];
     for (&(index, _), change) in MOVED.iter().zip(&changes) {
         columns[index] = by_change(change);
     }
@@ -279,6 +292,13 @@ pub(crate) fn derivatives(
     }
     columns[LOAD_GAIN] = by_change(&scaled);
     step_columns(coordinates, x, base, &changes[MOVED.len()..], &mut columns, by_change);
+    if let Some(start) = run.start {
+        // A wheel further out meets every step earlier.
+        let faces = (0..coordinates.steps()).map(|step| &columns[coordinates.position(step)]);
+        let less =
+            |sum: Channels, of| combined(&sum, of, |sum, of| sum - of / coordinates.scale(x));
+        columns[start] = faces.fold(none, less);
+    }
     Ok(columns)
 }
 

@@ -142,9 +142,9 @@ pub(super) fn fitted(
             return Err(IdentifyError::Log(record.name.clone(), why.to_owned()));
         }
     }
-    let coordinates = Coordinates::of(scenario);
-    let runs: Vec<Run> =
-        records.iter().map(|record| Run::of(record, &coordinates)).collect::<Result<_, _>>()?;
+    let mut coordinates = Coordinates::of(scenario);
+    let run = |record| Run::of(record, &mut coordinates);
+    let runs: Vec<Run> = records.iter().map(run).collect::<Result<_, _>>()?;
     let contact = contact::fit(&runs, &coordinates)?;
     let actuator = actuator::fit(records, &runs, &contact.trajectories, contact.x[RADIUS])?;
     let report = Document { scenario, coordinates: &coordinates, runs: &runs, contact: &contact };

@@ -24,6 +24,8 @@ const SMOOTH_TURN: usize = 16;
 const SMOOTH_PRELOAD: usize = 6;
 /// Least number of readings of the unloaded rig for a zero.
 const LEAST_UNLOADED: usize = 50;
+/// Preload, N, and compression, mm, that still count as none, as for the controller's zero.
+const UNLOADED: (f64, f64) = (3.0, 0.1);
 /// Least preload at which a reading is compared, N.
 const LEAST_PRELOAD_N: f64 = 2.0;
 /// Relative distance from a mode's speed within which nothing is compared.
@@ -38,6 +40,8 @@ const STEADY: usize = 40;
 /// Time after the drive's start in which nothing is compared, ticks: the first counts do
 /// not show when the wheel began to turn.
 const STARTING: usize = 40;
+/// Relaxations after which the tread remembers nothing that shows.
+const FORGETS: f64 = 5.0;
 /// Acceleration beyond which the drive's effort is its inertia, mm/s^2.
 const MOST_ACCELERATION: f64 = 60.0;
 /// Duty beyond which the current limit may bind.
@@ -119,8 +123,7 @@ impl Traces {
         if end < start + 4 * EFFORT_BIN {
             return Err(bad("the run is too short"));
         }
-        // Unloaded: only before the first preload of a deployment.
-        let idle = if record.deploys() { &samples[..start] } else { &samples[..0] };
+        let idle = if record.deploys() { unloaded(&samples[..start]) } else { &[] };
         let preload_zero = zero(idle, |s| s.preload_n);
         let compression_zero = zero(idle, |s| s.compression_mm);
         let per_count = TAU / record.scenario.rig.sense.encoder_counts;
@@ -142,6 +145,11 @@ impl Traces {
         };
         traces.bin(record, moving);
         Ok(traces)
+    }
+
+    /// Whether it begins with a preload, as an earlier run has left it.
+    pub const fn is_loaded(&self) -> bool {
+        self.preload_zero.count == 0
     }
 
     /// Tick before the corner touches, if at the end the wheel turns at a step without
@@ -185,7 +193,13 @@ impl Traces {
             turn / ((ticks.len() - 1) as f64 * TICK_S)
         };
         let radius = rig.rig.wheel_radius_mm;
-        let starting = |ticks: &Range<usize>| ticks.start < moving + STARTING && ticks.end > moving;
+        // How an earlier run has left the tread and the load at rest is not known.
+        let is_loaded = self.is_loaded();
+        let forgets = (FORGETS * rig.tread.tau_s / TICK_S) as usize;
+        let starting = |ticks: &Range<usize>| {
+            let after = |start: usize| ticks.start < moving + start;
+            if is_loaded { after(forgets) } else { after(STARTING) && ticks.end > moving }
+        };
         // The instant at which grip ends is ill-conditioned, and from there on the wheel
         // grips and slips by turns: nothing that can be followed tick by tick.
         let slip = self.onset_of_slip(record);
@@ -245,6 +259,13 @@ fn ranges(span: &Range<usize>, length: usize) -> impl Iterator<Item = Range<usiz
 
 fn mean(samples: &[Sample], of: impl Fn(&Sample) -> f64) -> f64 {
     samples.iter().map(of).sum::<f64>() / samples.len() as f64
+}
+
+/// These readings at rest, none if they show a preload that an earlier run has left.
+fn unloaded(idle: &[Sample]) -> &[Sample] {
+    let shows = |of: fn(&Sample) -> f64, most: f64| mean(idle, of).abs() < most;
+    let is_free = shows(|s| s.preload_n, UNLOADED.0) && shows(|s| s.compression_mm, UNLOADED.1);
+    if is_free { idle } else { &[] }
 }
 
 fn zero(idle: &[Sample], of: impl Fn(&Sample) -> f64) -> Zero {

@@ -72,18 +72,8 @@ pub(crate) fn found(seed: u64, mut book: impl FnMut(&str, &dyn Fn(&mut Line))) {
 
 /// How widely the hidden parameters of a seed are drawn about the nominal rig.
 fn widened(seed: u64) -> Scenario {
-    let mut wide = Scenario::default();
-    wide.spread.k_inf_rel = 0.15;
-    wide.spread.stiffening_rel = 0.12;
-    wide.spread.tau_rel = 0.15;
-    wide.spread.mu_rel = 0.06;
-    wide.spread.top_load_rel = 0.10;
-    wide.spread.spring_rel = 0.10;
-    wide.spread.delay_rel = 0.20;
-    wide.spread.lag_rel = 0.20;
-    wide.spread.slew_rel = 0.10;
-    wide.run.seed = seed;
-    wide
+    let wide = include_str!("hidden.toml");
+    Scenario::parse("hidden.toml", wide, &[format!("run.seed={seed}")]).expect("a scenario")
 }
 
 /// The hidden values by the names under which three deployments identify them.
