@@ -132,8 +132,8 @@ fn pressed_n(case: &StressCase) -> f64 {
 /// The message of the refusal of an impossible case, or why it was not refused by this name.
 fn refused(case: &StressCase, name: &str) -> Result<String, String> {
     match drive::plant(case).check(pressed_n(case)) {
-        Err(refusal) if refusal.name() == name => Ok(refusal.to_string()),
-        Err(refusal) => Err(format!("refused as {}, not as {name}", refusal.name())),
+        Err(refusal) if refusal.name == name => Ok(refusal.to_string()),
+        Err(refusal) => Err(format!("refused as {}, not as {name}", refusal.name)),
         Ok(()) => Err(format!("not refused, though {name}")),
     }
 }
