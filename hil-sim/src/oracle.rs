@@ -17,7 +17,6 @@
 mod drive;
 mod leg;
 pub mod pattern;
-mod profile;
 
 use interstage::rig::Rig;
 
@@ -25,10 +24,9 @@ use crate::montecarlo::RunLine;
 use crate::report::verdict::SLIP_SEEN_MM;
 use crate::scenario::{Direction, Scenario};
 use crate::session::{RunError, initial_rig};
-use drive::Driven;
+use drive::{Driven, Limits};
 use leg::{Leg, Reached, Track};
 use pattern::pattern_search;
-use profile::Limits;
 
 /// Cost of a leg that breaks a bound, s, beside that of by how much.
 const BROKEN_S: f64 = 100.0;

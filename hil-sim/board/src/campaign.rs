@@ -22,9 +22,8 @@ use crate::fault_injector::Saving;
 use crate::log::Strings;
 use crate::peripherals::rcc::Cause;
 use crate::run::store;
-use hil_sim::faults::campaign::operator::Operator;
 use hil_sim::faults::campaign::{
-    AFTER_S, FaultCampaign, Instant, Outcome, Twin, crossed, doing, longest_s,
+    AFTER_S, FaultCampaign, Instant, Operator, Outcome, Twin, crossed, doing, longest_s,
 };
 use hil_sim::faults::judge::{Finding, Judge};
 use hil_sim::faults::sets;

@@ -2,8 +2,7 @@
 
 use interstage::rig::Rig;
 
-use super::drive::Driven;
-use super::profile::Limits;
+use super::drive::{Driven, Limits};
 use super::{BROKEN_S, Bounds};
 use crate::plant::draw::PlantParameters;
 use crate::report::verdict::SLIP_SEEN_MM;

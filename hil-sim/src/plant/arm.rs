@@ -1,4 +1,4 @@
-//! The inclined drive arm: geometry, and its first modes as oscillators.
+//! The inclined drive arm: geometry, friction of its pivot, and its first modes as oscillators.
 
 /// Geometry of the arm.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -161,6 +161,37 @@ impl Mode {
     }
 }
 
+/// Travel over which the pivot's friction turns round, mm at the wheel. Chosen, so that it is
+/// softer than the tread.
+const TURNS_IN_MM: f64 = 0.05;
+
+/// Coulomb friction in the arm's pivot that turns round over a short travel (Dahl's model,
+/// linear up to its bound).
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Pivot {
+    /// Friction, N at the wheel.
+    friction_n: f64,
+    /// Travel since friction turned round, mm, bounded either way.
+    bent_mm: f64,
+}
+
+impl Pivot {
+    /// A pivot with this friction, N at the wheel, relaxed.
+    pub const fn new(friction_n: f64) -> Self {
+        Self { friction_n, bent_mm: 0.0 }
+    }
+
+    /// The wheel has moved by this towards the pillar, mm.
+    pub fn follow(&mut self, rise_mm: f64) {
+        self.bent_mm = (self.bent_mm + rise_mm).clamp(-TURNS_IN_MM, TURNS_IN_MM);
+    }
+
+    /// Force that presses the wheel to the wall, N: against its motion.
+    pub fn force_n(&self) -> f64 {
+        self.friction_n * self.bent_mm / TURNS_IN_MM
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -227,5 +258,18 @@ mod tests {
         assert!((arm.angle(125.0).to_degrees() - 46.397).abs() < 1e-2);
         assert!(arm.thrust_ratio(125.0) > arm.thrust_ratio(113.0));
         assert!(arm.thrust_ratio(113.0) > 0.8);
+    }
+
+    #[test]
+    fn friction_presses_against_the_motion_up_to_its_bound() {
+        let mut pivot = Pivot::new(2.0);
+        assert_eq!(pivot.force_n(), 0.0);
+        pivot.follow(0.025);
+        assert_eq!(pivot.force_n(), 1.0);
+        pivot.follow(3.0);
+        assert_eq!(pivot.force_n(), 2.0);
+        // Both bounds apart: the hysteresis.
+        pivot.follow(-0.1);
+        assert_eq!(pivot.force_n(), -2.0);
     }
 }

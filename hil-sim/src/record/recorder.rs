@@ -5,17 +5,20 @@ use interstage::restart::Restart;
 use interstage::supervise::{Mode, ServiceDuties};
 use interstage::tick::{CrossingRecord, Entry, Event, Telemetry};
 use interstage::units::{Direction, Duty, Q16};
+use serde_json::{Map, Value, json};
 use sha2::{Digest, Sha256};
 
 use super::tick::MOVES;
 use super::time_lost::TimeSplit;
 use super::{
-    Controller, CrossingLine, LogLine, Recording, Report, Summary, Tick, drawn, mode_number,
-    mode_words, stage_name,
+    Controller, CrossingLine, LogLine, Recording, Report, Summary, Tick, mode_number, mode_words,
+    stage_name,
 };
+use crate::plant::draw::PlantParameters;
 use crate::plant::ledger::Crossing;
 use crate::plant::rig::{Truth, VirtualRig};
-use crate::scenario::Scenario;
+use crate::plant::spread::Section;
+use crate::scenario::{MismatchDraw, Scenario};
 use crate::session::{TICK_S, longest_s};
 
 /// Largest distance from the end of travel after arrival, mm: twice the effect of creep and
@@ -150,7 +153,7 @@ impl RunRecorder {
             seed: scenario.run.seed,
             version: env!("CARGO_PKG_VERSION").to_owned(),
             overrides: scenario.overrides(),
-            drawn: drawn::of(plant.parameters(), scenario),
+            drawn: drawn(plant.parameters(), scenario),
             measured: false,
             missing: Vec::new(),
             commanded_s: self.run_started.and(self.commanded),
@@ -283,6 +286,41 @@ pub(super) fn restart_words(restart: Restart) -> String {
     restart.to_string().replacen("started: ", "", 1)
 }
 
+/// The value that the plant has of each key that its seed draws; of `mismatch.*` where that is
+/// drawn. Lists are one value a step.
+fn drawn(plant: &PlantParameters, scenario: &Scenario) -> Map<String, Value> {
+    let share = scenario.rig.plant.top_load_share;
+    let steps = plant.wall.steps();
+    let positions: Vec<f64> = steps.iter().map(|step| step.position_mm).collect();
+    let heights: Vec<f64> = steps.iter().map(|step| step.height_mm).collect();
+    let top_load_n = if share > 0.0 { plant.load_n / share } else { 0.0 };
+    let drawn = [
+        ("tread.k_inf_pa_per_m", json!(1e9 * plant.ring.k_inf)),
+        ("tread.stiffening", json!(plant.ring.k_0 / plant.ring.k_inf)),
+        ("tread.tau_s", json!(plant.ring.tau_s)),
+        ("plant.mu", json!(plant.mu)),
+        ("plant.top_load_n", json!(top_load_n)),
+        ("rig.wheel_radius_mm", json!(plant.ring.radius_mm)),
+        ("rig.step_positions_mm", json!(positions)),
+        ("rig.step_height_mm", json!(heights)),
+        ("preload.spring_n_per_mm", json!(plant.spring_n_per_mm)),
+        ("preload.delay_s", json!(plant.delay_s)),
+        ("preload.lag_s", json!(plant.lag_s)),
+        ("preload.slew_n_per_s", json!(plant.slew_n_per_s)),
+        ("preload sensor gain", json!(plant.sensors.preload_sensor_gain)),
+        ("compression sensor gain", json!(plant.sensors.tread_gain)),
+        ("arm angle zero, deg", json!(plant.sensors.angle_zero_rad.to_degrees())),
+    ];
+    let mut all: Map<String, Value> =
+        drawn.into_iter().map(|(key, value)| (key.to_owned(), value)).collect();
+    if scenario.run.mismatch != MismatchDraw::Stated && scenario.run.seed > 0 {
+        let mismatch = scenario.drawn_mismatch();
+        let values = mismatch.values();
+        all.extend(values.map(|(field, value)| (format!("mismatch.{}", field.name), json!(value))));
+    }
+    all
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -354,5 +392,30 @@ mod tests {
         assert_eq!(cut_off(120_000).cut_off_s, Some(120.0));
         let said = crate::report::verdict::headline(&cut_off(120_000));
         assert!(said.starts_with("Did not complete within 120 s: "), "{said}");
+    }
+
+    #[test]
+    fn the_nominal_plant_has_the_values_of_its_scenario_and_a_seed_others() {
+        let drawn = |set: &str| {
+            let scenario = Scenario::resolve(None, None, &[set.to_owned()]).unwrap();
+            (super::drawn(&scenario.plant(), &scenario), scenario)
+        };
+        let (nominal, scenario) = drawn("run.seed=0");
+        let value = |key: &str| nominal[key].as_f64().unwrap();
+        let rig = &scenario.rig;
+        for (key, stated) in [
+            ("tread.k_inf_pa_per_m", rig.tread.k_inf_pa_per_m),
+            ("tread.stiffening", rig.tread.stiffening),
+            ("tread.tau_s", rig.tread.tau_s),
+            ("plant.mu", rig.plant.mu),
+            ("plant.top_load_n", rig.plant.top_load_n),
+            ("rig.wheel_radius_mm", rig.rig.wheel_radius_mm),
+            ("preload.delay_s", rig.preload.delay_s),
+            ("preload.lag_s", rig.preload.lag_s),
+        ] {
+            assert!((value(key) / stated - 1.0).abs() < 1e-9, "{key} {} {stated}", value(key));
+        }
+        let (other, _) = drawn("run.seed=5");
+        assert!(other.iter().all(|(key, value)| nominal[key] != *value), "{other:?}");
     }
 }

@@ -7,7 +7,7 @@ use toml::{Table, Value};
 
 use super::run::{ControllerKind, Direction, MismatchDraw, RunOptions};
 use crate::plant::mismatch::Mismatch;
-use crate::plant::section::{Field, Section};
+use crate::plant::spread::{Field, Section};
 use crate::plant::spread::{Noise, Spread};
 
 /// Names of the presets.

@@ -1,7 +1,7 @@
 //! The first law over complete climbs and descents.
 
 use hil_sim::plant::draw::PlantParameters;
-use hil_sim::plant::energy::Energy;
+use hil_sim::plant::rig::Energy;
 use hil_sim::plant::rig::{Resolution, VirtualRig};
 use hil_sim::scenario::Scenario;
 

@@ -221,7 +221,7 @@ impl Coupled {
         }));
         // Beside the nearest points of the wall, as far as a bulge may reach.
         let lowest = motion.height_mm - LOWER_MM;
-        let (floor, step) = super::window::reach(&motion.wall, lowest - BULGE_MM, radius);
+        let (floor, step) = super::layout::reach(&motion.wall, lowest - BULGE_MM, radius);
         let (from, to) = (-floor, step.map_or(floor, |(_, to)| to.max(floor)));
         let at = |angle: f64| ((turned + angle) / pitch).floor() as i64 - first;
         let facing = ready.facing.len() as i64;

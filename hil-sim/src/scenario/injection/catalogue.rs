@@ -3,7 +3,7 @@
 
 use std::sync::LazyLock;
 
-use super::kinds::{Kind, Target};
+use super::{Kind, Target};
 
 /// A fault that a scenario can name.
 #[derive(Clone, Copy, Debug, PartialEq)]

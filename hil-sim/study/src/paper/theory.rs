@@ -6,7 +6,7 @@ use anyhow::{Context, Result};
 use interstage::units::Direction;
 
 use super::case::{Arms, Case};
-use super::history::{History, INTERVAL_S, Instant};
+use super::histories::{History, INTERVAL_S, Instant};
 use super::measure::{corner_area_mm2, stress_kpa};
 use hil_sim::plant::balance::{Axial, Balance};
 use hil_sim::plant::ring::{Motion, Ring, RingParameters};
