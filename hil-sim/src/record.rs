@@ -7,7 +7,6 @@ mod columns;
 mod csv_file;
 mod decoder;
 mod joined;
-pub(crate) mod json;
 mod mcap_file;
 mod probed;
 mod read;

@@ -3,7 +3,6 @@
 
 mod cases;
 mod drive;
-mod roll;
 
 use std::collections::BTreeMap;
 use std::convert::Infallible;
@@ -142,7 +141,7 @@ fn refused(case: &StressCase, name: &str) -> Result<String, String> {
 fn one(case: &StressCase) -> Result<[f64; 6], String> {
     let plant = drive::plant(case);
     plant.check(pressed_n(case)).map_err(|refusal| format!("refused: {refusal}"))?;
-    let rolled = roll::run(case).map_err(|error| format!("ring: {error}"))?;
+    let rolled = drive::roll(case).map_err(|error| format!("ring: {error}"))?;
     let drove = drive::run(case, &plant).map_err(|error| error.to_string())?;
     let deepest = DEEPEST * RADIUS_MM;
     Ok([

@@ -1,5 +1,7 @@
 //! The inclined drive arm: geometry, friction of its pivot, and its first modes as oscillators.
 
+use interstage::rig::Rig;
+
 /// Geometry of the arm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Arm {
@@ -12,6 +14,12 @@ pub struct Arm {
 }
 
 impl Arm {
+    /// That of a rig.
+    pub fn of(rig: &Rig) -> Self {
+        let (length_mm, pivot_mm) = (rig.rig.arm_length_mm, rig.rig.arm_pivot_radius_mm);
+        Self { length_mm, pivot_mm, coupling: rig.plant.arm_coupling }
+    }
+
     /// Angle from the pillar with the wheel centre at this radius, rad.
     pub fn angle(&self, radius_mm: f64) -> f64 {
         ((radius_mm - self.pivot_mm) / self.length_mm).clamp(-1.0, 1.0).asin()

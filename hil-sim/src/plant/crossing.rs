@@ -3,6 +3,7 @@
 
 use std::path::Path;
 
+use interstage::rig::Rig;
 use serde::Deserialize;
 
 use super::balance::{Axial, Balance, BalanceError};
@@ -24,6 +25,19 @@ pub struct CrossingCase {
     pub axial: Axial,
     /// Axial travel per step of time, mm.
     pub stride_mm: f64,
+}
+
+impl CrossingCase {
+    /// A crossing of this rig's step by a ring of so many elements, in strides of this axial
+    /// travel, mm: its speed, mm/s, preload, N, and how it is moved.
+    pub fn of(
+        rig: &Rig,
+        (elements, stride_mm): (usize, f64),
+        (speed_mm_s, preload_n, axial): (f64, f64, Axial),
+    ) -> Self {
+        let (ring, step_height_mm) = (RingParameters::of(rig, elements), rig.rig.step_height_mm);
+        Self { ring, step_height_mm, speed_mm_s, preload_n, axial, stride_mm }
+    }
 }
 
 /// What a crossing gives.
@@ -98,7 +112,7 @@ pub fn cross_along(
         base = local.base_mm;
         let (speed_mm_s, preload_n) = course(x);
         let dt_s = case.stride_mm / speed_mm_s;
-        let balance = Balance { preload_n, spring_n_per_mm: 0.0, arm_n: 0.0, axial: case.axial };
+        let balance = Balance::under(preload_n, case.axial);
         let motion = Motion { wall: local, height_mm: height, turn_rad: dx / radius, dt_s };
         let solved = balance.solve(&mut ring, motion)?;
         height = solved.height_mm;

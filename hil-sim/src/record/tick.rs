@@ -415,9 +415,23 @@ impl Tick {
         self.truth.as_ref().map_or(f64::NAN, of)
     }
 
+    /// A true quantity, or where there is no truth the controller's.
+    pub fn known(
+        &self,
+        truth: impl Fn(&TrueState) -> f64,
+        controller: impl Fn(&Controller) -> f64,
+    ) -> f64 {
+        self.truth.as_ref().map_or_else(|| controller(&self.controller), truth)
+    }
+
     /// Axial position, mm: the true one, or by odometry where there is none.
     pub fn position_mm(&self) -> f64 {
-        self.truth.map_or(self.controller.position_mm, |truth| truth.position_true_mm)
+        self.known(|truth| truth.position_true_mm, |seen| seen.position_mm)
+    }
+
+    /// Compression of the tread, mm: the true one, or as it was measured.
+    pub fn compression_mm(&self) -> f64 {
+        self.known(|truth| truth.compression_true_mm, |seen| seen.compression_mm)
     }
 }
 

@@ -165,7 +165,7 @@ fn panels(runs: [(&str, &Recording); 2]) -> Vec<Panel> {
     let mut preload = panel("Preload", "preload, N", &|row| row.controller.preload_n);
     preload.levels = views[0].limit_n.iter().map(|&n| ("limit", Look::Limit, n)).collect();
     let speed = panel("Speed", "speed, mm/s", &|row| {
-        row.truth.map_or(row.controller.wheel_speed_mm_s, |t| t.speed_true_mm_s)
+        row.known(|t| t.speed_true_mm_s, |c| c.wheel_speed_mm_s)
     });
     let position = panel("Position on the sleeve", "position, mm", &Tick::position_mm);
     let mut slip = panel("Gross slip of the wheel", "slip, mm", &|row| row.of_truth(|t| t.slip_mm));

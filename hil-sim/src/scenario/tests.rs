@@ -149,6 +149,31 @@ fn a_value_out_of_range_is_named_with_its_range() {
 }
 
 #[test]
+fn an_error_names_the_key_that_was_set_and_the_bound_that_it_broke() {
+    for (set, parts) in [
+        ("preload.cruise_n=60", &[" = 60", "at most 47.", "preload.limit_n = 50"][..]),
+        ("preload.limit_n=20", &[" = 20", "at least 34.", "preload.cruise_n = 33.3"]),
+        ("drive.cruise_speed_mm_s=90", &[" = 90", "at most"]),
+        ("drive.cruise_speed_mm_s=4", &[" = 4", "at least 5"]),
+        ("control.safe_speed_mm_s=60", &[" = 60", "at most"]),
+        ("rig.step_positions_mm=18,40,95", &["step 3 is at 95 mm", "at most 80"]),
+        ("rig.step_positions_mm=40,18,62", &["step 2 "]),
+        ("rig.step_positions_mm=18,20,62", &["step 2 is at 20 mm", "at least"]),
+        ("rig.travel_mm=50", &[" = 50", "at least 62"]),
+        ("rig.wheel_radius_mm=120", &[" = 120"]),
+        ("rig.wall_radius_mm=400", &[" = 400"]),
+    ] {
+        let said = set_error(set);
+        let key = set.split('=').next().unwrap();
+        assert!(said.starts_with(&format!("command line: {key}")), "{said}");
+        assert!(
+            said.lines().count() == 1 && parts.iter().all(|part| said.contains(part)),
+            "{said}"
+        );
+    }
+}
+
+#[test]
 fn a_preload_limit_without_room_above_the_cruise_preload_is_refused() {
     for (text, message) in [
         (
@@ -247,8 +272,16 @@ fn faults_are_read_and_written_back() {
 
 #[test]
 fn every_mistake_of_a_fault_is_named() {
+    let near = "target = \"preload_sensor\": no such target, did you mean \"preload-sensor\"?";
     for (target, kind, rest, message) in [
         ("angel", "off", "at_s = 1", "target = \"angel\": no such target, did you mean \"angle\"?"),
+        ("preload_sensor", "stuck", "at_s = 2", near),
+        (
+            "preload-sensor",
+            "stock",
+            "at_s = 2",
+            "kind = \"stock\": no such kind, did you mean \"stuck\"?",
+        ),
         ("model", "off", "at_s = 1", "kind = \"off\": expected \"hung\""),
         ("model", "hung", "", "at_s = nothing: expected one of at_s, at_mm and at_crossing"),
         ("model", "hung", "at_s = 1\nat_mm = 2", "at_s = at_s and at_mm: expected one of"),

@@ -3,6 +3,7 @@
 //! Every case is possible: preload, load and spring press no more than the tread carries under
 //! the corner of its step. Impossible cases are drawn separately: they must be refused.
 
+use interstage::rig::Rig;
 use serde::Serialize;
 
 use crate::plant::draw::ELEMENTS;
@@ -132,16 +133,8 @@ impl StressCase {
     /// Wheel and rubber.
     pub(super) fn ring(&self) -> RingParameters {
         let k_inf = self.k_inf_pa_per_m * 1e-9;
-        RingParameters {
-            radius_mm: RADIUS_MM,
-            width_mm: WIDTH_MM,
-            k_inf,
-            k_0: k_inf * self.stiffening,
-            tau_s: self.tau_s,
-            elements: ELEMENTS,
-            tread_thickness_mm: 0.0,
-            second_relaxation: 1.0,
-        }
+        let (k_0, tau_s) = (k_inf * self.stiffening, self.tau_s);
+        RingParameters { k_inf, k_0, tau_s, ..RingParameters::of(&Rig::prototype(), ELEMENTS) }
     }
 
     /// Speed of the unloaded motor, mm/s.

@@ -69,12 +69,17 @@ impl Histories {
             Source::Theory => quantity.of(&self.theory).clone(),
             Source::Simulation => quantity.of(&self.simulation).clone(),
             _ => {
-                let means: Vec<&Points> = self.means.iter().map(|m| quantity.of(m)).collect();
-                let count = means.len() as f64;
-                let sum = |i: usize| means.iter().map(|mean| mean[i].1).sum::<f64>();
-                (0..means[0].len()).map(|i| (means[0][i].0, sum(i) / count)).collect()
+                let times = quantity.of(&self.means[0]).iter().map(|point| point.0);
+                times.zip(self.mean(|history, i| quantity.of(history)[i].1)).collect()
             }
         }
+    }
+
+    /// The mean of the means of what `of` gives for each of their points.
+    fn mean(&self, of: impl Fn(&History, usize) -> f64) -> Vec<f64> {
+        let sum = |i: usize| self.means.iter().map(|mean| of(mean, i)).sum::<f64>();
+        let count = self.means.len() as f64;
+        (0..self.means[0].position_mm.len()).map(|i| sum(i) / count).collect()
     }
 
     /// Axial position of the wheel at the points of a source, mm; of the experiment the mean
@@ -83,11 +88,7 @@ impl Histories {
         match source {
             Source::Theory => self.theory.position_mm.clone(),
             Source::Simulation => self.simulation.position_mm.clone(),
-            _ => {
-                let count = self.means.len() as f64;
-                let sum = |i: usize| self.means.iter().map(|mean| mean.position_mm[i]).sum::<f64>();
-                (0..self.means[0].position_mm.len()).map(|i| sum(i) / count).collect()
-            }
+            _ => self.mean(|history, i| history.position_mm[i]),
         }
     }
 

@@ -16,7 +16,6 @@ use crate::reference::beam::BeamError;
 use crate::reference::vibration::Arm;
 use hil_sim::plant::balance::{Axial, BalanceError};
 use hil_sim::plant::crossing::{CrossingCase, cross};
-use hil_sim::plant::ring::RingParameters;
 use hil_sim::plant::spread::Noise;
 use hil_sim::plant::spread::Section;
 use hil_sim::rollout::{CrossingSetup, Wheel};
@@ -261,14 +260,8 @@ fn secant(
 
 /// Friction that a driven crossing takes at 5 mm/s.
 fn friction(rig: &Rig, pressing_n: f64, load_n: f64) -> Result<f64, BalanceError> {
-    let result = cross(&CrossingCase {
-        ring: RingParameters::of(rig, COARSE.0),
-        step_height_mm: rig.rig.step_height_mm,
-        speed_mm_s: rig.control.safe_speed_mm_s,
-        preload_n: pressing_n,
-        axial: Axial::Driven(load_n),
-        stride_mm: COARSE.1,
-    })?;
+    let of = (rig.control.safe_speed_mm_s, pressing_n, Axial::Driven(load_n));
+    let result = cross(&CrossingCase::of(rig, COARSE, of))?;
     Ok(result.mu_needed)
 }
 
