@@ -22,6 +22,9 @@ fn parameters_are_checked_before_anything_is_written() {
     }
 }
 
+/// The last seed that two others can follow.
+const LAST: &str = "9223372036854775805";
+
 #[test]
 fn options_are_checked_by_name() {
     for (arguments, names) in [
@@ -62,9 +65,14 @@ fn options_are_checked_by_name() {
         ("stress -n -1", &["--cases <CASES>", "'-1'"]),
         ("stress --seed -1", &["--seed", "-1", "a whole number, 0 or more"]),
         ("montecarlo -n -1", &["-n <N>", "'-1'"]),
-        ("montecarlo -n 2 --seed 9223372036854775807", &["run.seed = 9223372036854775807"]),
-        ("compare -n 2 --seed 9223372036854775807", &["run.seed = 9223372036854775807"]),
-        ("montecarlo -n 1 --shard 2/2", &["--shard 2/2", "none for this one"]),
+        ("montecarlo -n 2 --seed 9223372036854775807", &["run.seed = 9223372036854775807", LAST]),
+        ("compare -n 2 --seed 9223372036854775807", &["run.seed = 9223372036854775807", LAST]),
+        ("faults -n 2 --set run.seed=9223372036854775806", &["run.seed", LAST]),
+        ("montecarlo -n 1 --shard 2/2", &["--shard 2/2", "of 1", "none for this one"]),
+        ("faults --only tick -n 1 --shard 2/2", &["--shard 2/2"]),
+        ("envelope -n 8", &["-n", "8", "8x7"]),
+        ("envelope -n 1x7", &["-n", "1x7", "8x7"]),
+        ("envelope -n axb", &["-n", "axb", "8x7"]),
         ("faults --clean 1 --shard 2/2", &["--shard 2/2", "none for this one"]),
         ("faults --only preload-sensor --shard 90/100", &["--shard 90/100", "none for this one"]),
     ] {
