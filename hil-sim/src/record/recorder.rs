@@ -33,11 +33,10 @@ pub struct RunRecorder {
     /// One row a tick, if they are kept.
     rows: Vec<Tick>,
     log: Vec<LogLine>,
-    faults: Vec<Report>,
-    limits: Vec<Report>,
     /// Crossings as the controller reported them, and when, s.
     reported: Vec<(f64, CrossingRecord)>,
-    gap_ref_mm: f64,
+    /// Reference gap, faults, limits, and what restarted the controller after the command.
+    summary: Summary,
     start_mm: f64,
     commanded: Option<f64>,
     run_started: Option<f64>,
@@ -46,15 +45,14 @@ pub struct RunRecorder {
     moving: u32,
     worst_separation: f64,
     split: TimeSplit,
-    /// What restarted the controller after the command.
-    restart: Option<String>,
     passed: u32,
 }
 
 impl RunRecorder {
     /// A run from `start_mm` with this reference gap, mm.
     pub fn new(gap_ref_mm: f64, start_mm: f64) -> Self {
-        Self { gap_ref_mm, start_mm, ..Self::default() }
+        let summary = Summary { gap_ref_mm, ..Summary::default() };
+        Self { summary, start_mm, ..Self::default() }
     }
 
     /// Time at which this tick began, s.
@@ -75,16 +73,12 @@ impl RunRecorder {
         digest(&mut self.digest, telemetry);
         for Entry { event, .. } in events {
             self.log.push(LogLine { t_s, text: text(event) });
-            match reported(t_s, event) {
-                Some((true, fault)) => self.faults.push(fault),
-                Some((false, limit)) => self.limits.push(limit),
-                None => {}
-            }
+            self.summary.take(t_s, event);
             match event {
                 Event::Crossing(record) => self.reported.push((t_s, *record)),
                 // Under way, it ends the run.
                 Event::Restart(restart) if self.commanded.is_some() => {
-                    self.restart = Some(restart_words(*restart));
+                    self.summary.restart = Some(restart_words(*restart));
                 }
                 Event::Mode(Mode::Preload(_)) => self.accept_command(),
                 _ => {}
@@ -140,7 +134,7 @@ impl RunRecorder {
         let crossings: Vec<CrossingLine> =
             plant.ledger().crossings().iter().map(|c| crossing_line(c, &self.reported)).collect();
         let worst = crossings.iter().map(|c| c.gap_mm).fold(self.worst_separation, f64::max);
-        let completed = there && crossings.len() == steps && self.faults.is_empty();
+        let completed = there && crossings.len() == steps && self.summary.faults.is_empty();
         let cruise_mm_s = scenario.rig.drive.cruise_speed_mm_s;
         let has_gap = !crossings.is_empty() || worst > 0.0;
         let total_s = self.time_s();
@@ -154,8 +148,6 @@ impl RunRecorder {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             overrides: scenario.overrides(),
             drawn: drawn(plant.parameters(), scenario),
-            measured: false,
-            missing: Vec::new(),
             commanded_s: self.run_started.and(self.commanded),
             duration_s: self.run_started.and(self.commanded).map(|from| self.run_ended - from),
             moving_s: self.run_started.map_or(0.0, |from| self.run_ended - from),
@@ -163,19 +155,16 @@ impl RunRecorder {
             total_s,
             cut_off_s: Some(longest_s(&scenario.rig)).filter(|longest_s| total_s >= *longest_s),
             travel_mm: (truth.position_mm - self.start_mm).abs(),
-            gap_ref_mm: self.gap_ref_mm,
             max_gap_mm: if has_gap { worst } else { f64::NAN },
             slip_mm: truth.slip_mm,
             mean_preload_n: self.preload_sum / f64::from(self.moving.max(1)),
             energy_j: truth.work_mj * 1e-3,
             wear_j: truth.wear_mj * 1e-3,
-            faults: self.faults,
-            limits: self.limits,
             injected: scenario.run.faults.iter().map(ToString::to_string).collect(),
             real_time_factor: total_s / wall_s.max(1e-9),
             trace_digest: self.digest.finalize().iter().map(|b| format!("{b:02x}")).collect(),
-            restart: self.restart,
             crossings,
+            ..self.summary
         };
         Recording {
             summary,
@@ -230,14 +219,16 @@ fn digest(digest: &mut Sha256, seen: &Telemetry) {
     digest.update(seen.pretightener.to_bits().to_le_bytes());
 }
 
-/// Code and sentence of a fault or a limit, and whether it is a fault.
-pub(super) fn reported(t_s: f64, event: &Event) -> Option<(bool, Report)> {
-    let (latched, code, text) = match event {
-        Event::Fault(fault) => (true, fault.code(), fault.sentence()),
-        Event::Limit(limit) => (false, limit.code(), limit.sentence()),
-        _ => return None,
-    };
-    Some((latched, Report { t_s, code, text: text.to_owned() }))
+impl Summary {
+    /// Takes the report of a fault or a limit, if the event is one.
+    pub(super) fn take(&mut self, t_s: f64, event: &Event) {
+        let (all, code, text) = match event {
+            Event::Fault(fault) => (&mut self.faults, fault.code(), fault.sentence()),
+            Event::Limit(limit) => (&mut self.limits, limit.code(), limit.sentence()),
+            _ => return,
+        };
+        all.push(Report { t_s, code, text: text.to_owned() });
+    }
 }
 
 /// An event as one line of text.
