@@ -70,7 +70,7 @@ pub struct Ripple {
 
 /// One mode of the arm: a damped oscillator, integrated exactly for a sinusoidal force and one
 /// that runs linearly.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Mode {
     /// Circular frequency, rad/s.
     omega: f64,
@@ -97,17 +97,7 @@ impl Mode {
     pub fn new(parameters: ModeParameters) -> Self {
         let ModeParameters { frequency_hz, damping: zeta, mass_kg, shape } = parameters;
         let omega = std::f64::consts::TAU * frequency_hz;
-        Self {
-            omega,
-            zeta,
-            stiffness: mass_kg * omega * omega * 1e-3,
-            shape,
-            held: 0.0,
-            deflection: 0.0,
-            rate: 0.0,
-            step: 0.0,
-            propagator: [[1.0, 0.0], [0.0, 1.0]],
-        }
+        Self { omega, zeta, stiffness: mass_kg * omega * omega * 1e-3, shape, ..Self::default() }
     }
 
     /// Advances by `dt_s` under `force` and a force that runs from one value to the other, N:

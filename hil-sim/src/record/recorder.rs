@@ -125,10 +125,8 @@ impl RunRecorder {
         let truth = plant.truth();
         let steps = plant.parameters().wall.steps().len();
         let there = arrived.is_some_and(|direction| {
-            let end_mm = match direction {
-                Direction::Deploy => scenario.rig.rig.travel_mm,
-                Direction::Retract => 0.0,
-            };
+            let deploys = direction == Direction::Deploy;
+            let end_mm = if deploys { scenario.rig.rig.travel_mm } else { 0.0 };
             (truth.position_mm - end_mm).abs() <= ARRIVED_WITHIN_MM
         });
         let crossings: Vec<CrossingLine> =

@@ -14,6 +14,7 @@ use crate::scenario::Scenario;
 use crate::session::RunningRig;
 
 /// A run without fault.
+#[derive(Default)]
 pub struct Twin {
     /// From the command to the end, s since boot.
     pub started_s: f64,
@@ -60,12 +61,8 @@ impl Twin {
     fn new(scenario: &Scenario) -> Result<Self, RigError> {
         let planner = Planner::try_build(&scenario.rig)?;
         Ok(Self {
-            started_s: 0.0,
-            ended_s: 0.0,
-            crossing_s: None,
-            crossings: Vec::new(),
-            limits: Vec::new(),
             gap_ref_mm: Direction::ALL.map(|direction| planner.gap_ref(direction).to_num()),
+            ..Self::default()
         })
     }
 

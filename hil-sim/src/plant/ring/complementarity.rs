@@ -70,7 +70,7 @@ impl Factors {
 }
 
 /// The problem of one rim and its last solution.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Complementarity {
     /// Displacement by a pressure, by their distance from -(n-1) to n-1 elements.
     compliance: Vec<f64>,
@@ -89,16 +89,7 @@ impl Complementarity {
         let lags = &compliance[1..most];
         let compliance: Vec<f64> =
             lags.iter().rev().chain(&compliance[..1]).chain(lags).copied().collect();
-        Self {
-            compliance,
-            most,
-            kept: Vec::new(),
-            pattern: Vec::new(),
-            indices: Vec::new(),
-            right: Vec::new(),
-            pressures: Vec::new(),
-            displacement: Vec::new(),
-        }
+        Self { compliance, most, ..Self::default() }
     }
 
     /// Compliance of an element at itself.

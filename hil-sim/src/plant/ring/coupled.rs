@@ -69,7 +69,7 @@ struct Ready {
 }
 
 /// The rim of a coupled tread.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Coupled {
     /// Relaxed shear modulus over k_inf, mm.
     modulus_mm: f64,
@@ -102,13 +102,9 @@ impl Coupled {
             u: vec![0.0; count],
             q: [vec![0.0; count], vec![0.0; count]],
             active: vec![false; count],
-            ready: Ready::default(),
-            met: Vec::new(),
-            wanted: Vec::new(),
-            touching: Vec::new(),
-            z: Vec::new(),
             stiffer: 1.0,
             forces: vec![0.0; count],
+            ..Self::default()
         }
     }
 
