@@ -27,7 +27,7 @@ pub(super) struct Peaks {
 /// A plant on a driven run.
 #[derive(Clone)]
 pub(super) struct Driven {
-    plant: VirtualRig,
+    pub(super) plant: VirtualRig,
     limits: Limits,
     /// The screw as it will be when the dead time is over, and its rate, N/s.
     screw: Pretightener,
@@ -38,7 +38,7 @@ pub(super) struct Driven {
     tick: u32,
     moved_from: Option<u32>,
     preload_sum: f64,
-    peaks: Peaks,
+    pub(super) peaks: Peaks,
 }
 
 impl Driven {
@@ -59,14 +59,6 @@ impl Driven {
             peaks: Peaks::default(),
             plant,
         }
-    }
-
-    pub(super) const fn plant(&self) -> &VirtualRig {
-        &self.plant
-    }
-
-    pub(super) const fn peaks(&self) -> Peaks {
-        self.peaks
     }
 
     /// Time since the command, s.
@@ -334,7 +326,7 @@ mod tests {
             assert!(acceleration.abs() <= 250.0 + 1e-9);
             assert!((acceleration - before.acceleration).abs() <= 5.0 + 1e-9);
             before = driven.motion;
-            let truth = driven.plant().truth();
+            let truth = driven.plant.truth();
             if driven.time_s() > 2.4 {
                 assert!((truth.preload_n - 48.0).abs() < 0.1, "{}", truth.preload_n);
             }
@@ -353,9 +345,9 @@ mod tests {
             driven.step(2.2, slow, 47.0).unwrap();
         }
         // Without following the climb would add 4.8 N.
-        assert!((47.0..48.5).contains(&driven.peaks().preload_n), "{:?}", driven.peaks());
-        assert_eq!(driven.plant().ledger().crossings().len(), 1);
-        let gap = driven.plant().ledger().crossings()[0].gap_mm;
+        assert!((47.0..48.5).contains(&driven.peaks.preload_n), "{:?}", driven.peaks);
+        assert_eq!(driven.plant.ledger().crossings().len(), 1);
+        let gap = driven.plant.ledger().crossings()[0].gap_mm;
         assert!((2.4..2.8).contains(&gap), "{gap}");
     }
 }

@@ -92,14 +92,7 @@ impl Topic {
     pub(crate) const LIVE: [Self; 3] = [Self::Tick, Self::Log, Self::Ledger];
 
     pub const fn name(self) -> &'static str {
-        match self {
-            Self::Tick => "/tick",
-            Self::Log => "/log",
-            Self::Ledger => "/ledger",
-            Self::Crossing => "/crossing",
-            Self::Summary => "/summary",
-            Self::Frames => FRAMES,
-        }
+        ["/tick", "/log", "/ledger", "/crossing", "/summary", FRAMES][self as usize]
     }
 
     /// JSON schema of its messages; null for frames, which are protobuf.

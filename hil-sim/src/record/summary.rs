@@ -181,7 +181,7 @@ impl Recording {
     }
 }
 
-fn nan() -> f64 {
+pub(super) fn nan() -> f64 {
     f64::NAN
 }
 

@@ -17,6 +17,7 @@ use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize};
 
 use super::columns::{ANGLE, angle_error, angle_frame, bit, mode_column, stage_column};
+use super::summary::nan;
 use crate::plant::rig::Truth;
 
 /// Names of the numbers in [`Controller::mode`].
@@ -384,10 +385,6 @@ pub struct TrueState {
     /// Deflection of the arm by its modes, um.
     #[serde(default = "nan")]
     pub vibration_true_um: f64,
-}
-
-fn nan() -> f64 {
-    f64::NAN
 }
 
 impl From<&Truth> for TrueState {

@@ -174,7 +174,7 @@ impl Coupled {
             }
             *u = if u.abs() < NONE_MM { 0.0 } else { *u };
             let near = place.checked_sub(ready.near.start);
-            let pressure = near.and_then(|near| contact.pressures().get(near));
+            let pressure = near.and_then(|near| contact.pressures.get(near));
             let force = scale * pressure.copied().unwrap_or(0.0);
             work_mj += 0.5 * (force + forces[i]) * (*u - old);
             forces[i] = force;
@@ -271,7 +271,7 @@ impl Coupled {
         let mut out = Contact { depth_mm, floor_pressure: f64::NEG_INFINITY, ..Contact::default() };
         let per_mm = modulus / contact.own();
         for (i, (element, met)) in near.iter().zip(met.iter()).enumerate() {
-            let pressure = contact.pressures()[i];
+            let pressure = contact.pressures[i];
             if touching[i] {
                 let force = scale * pressure;
                 let (c, s) = (force * element.cos, force * element.sin);
@@ -291,7 +291,7 @@ impl Coupled {
                 let raw = if touching[i] {
                     stiffer * modulus * pressure
                 } else {
-                    per_mm * (wanted[i] - contact.displacement()[i])
+                    per_mm * (wanted[i] - contact.displacement[i])
                 };
                 out.floor_pressure = out.floor_pressure.max(raw);
             }

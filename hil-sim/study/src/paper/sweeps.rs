@@ -44,25 +44,15 @@ impl Variable {
 
     /// Cases of the experiment.
     pub fn cases(self) -> Vec<Case> {
-        let values = match self {
-            Self::Preload => PRELOADS_N,
-            Self::Speed => SPEEDS_MM_S,
-        };
-        values.map(|value| self.case(value)).to_vec()
+        [PRELOADS_N, SPEEDS_MM_S][self as usize].map(|value| self.case(value)).to_vec()
     }
 
     fn of(self, case: &Case) -> f64 {
-        match self {
-            Self::Preload => case.preload_n,
-            Self::Speed => case.speed_mm_s,
-        }
+        [case.preload_n, case.speed_mm_s][self as usize]
     }
 
     fn axis(self) -> &'static str {
-        match self {
-            Self::Preload => "preload, N",
-            Self::Speed => "speed, mm/s",
-        }
+        ["preload, N", "speed, mm/s"][self as usize]
     }
 
     fn fixed(self) -> String {
