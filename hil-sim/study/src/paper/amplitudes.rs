@@ -155,7 +155,8 @@ impl Amplitudes {
 
     /// The claims of both.
     pub fn claims(&self, all: &[Histories]) -> Vec<Claim> {
-        let of = |figure, id| Claim::of(figure, SECTION, id);
+        let [loads, gaps] =
+            ["fig13-14", "fig15-16"].map(|figure| move |id| Claim::of(figure, SECTION, id));
         // A figure rises (falls) from the first case to another, in every source.
         type Goes = (fn(&Lift) -> f64, usize, f64);
         let goes = |of: Claim, (pick, to, sense): Goes, (decimals, unit), claim, reason| {
@@ -169,8 +170,8 @@ impl Amplitudes {
             let ours = self.values(Source::Simulation, pick);
             std::array::from_fn::<f64, 3, _>(|i| ours[i] / published[i] - 1.0)
         };
-        let forces = off(COLLISION_N, |lift| lift.collision_n);
-        let gaps = off(AMPLITUDE_MM, |lift| lift.gap_mm);
+        let force_off = off(COLLISION_N, |lift| lift.collision_n);
+        let gap_off = off(AMPLITUDE_MM, |lift| lift.gap_mm);
         let largest = |all: [f64; 3]| all.iter().fold(0.0, |most: f64, part| most.max(part.abs()));
         let resemblance = resemblance(all);
         let [expected, simulated] = [Source::Theory, Source::Simulation]
@@ -185,63 +186,63 @@ impl Amplitudes {
         let stress: fn(&Lift) -> f64 = |lift| lift.impact_kpa;
         let gap: fn(&Lift) -> f64 = |lift| lift.gap_mm;
         vec![
-            goes(of("fig13-14", "fe-collision-falls-with-preload"), (force, 1, -1.0), (1, "N"),
+            goes(loads("fe-collision-falls-with-preload"), (force, 1, -1.0), (1, "N"),
                 "The collision force falls from 56.5 N to 51.2 N when the preload rises from 100 N to 120 N \
                  at 5 mm/s.",
                 "It rises: the wheel climbs with the force that presses it. This is the plainest \
                  disagreement between the study and any quasi-static climb; no parameter of ours is tuned \
-                 to hide it."
+                 to hide it.",
             ),
-            goes(of("fig13-14", "fe-collision-grows-with-speed"), (force, 2, 1.0), (1, "N"),
+            goes(loads("fe-collision-grows-with-speed"), (force, 2, 1.0), (1, "N"),
                 "The collision force grows from 56.5 N to 58.6 N when the speed rises from 5 mm/s to 8 mm/s \
                  at 100 N.",
-                ""
+                "",
             ),
-            of("fig13-14", "fe-collision-values").explained(
+            loads("fe-collision-values").explained(
                 "The three collision forces are 56.5, 51.2 and 58.6 N.",
-                largest(forces) < 0.10,
+                largest(force_off) < 0.10,
                 format!(
                     "The simulation, not fitted to them, is off by {:+.1} %, {:+.1} % and {:+.1} %.",
-                    100.0 * forces[0], 100.0 * forces[1], 100.0 * forces[2]
+                    100.0 * force_off[0], 100.0 * force_off[1], 100.0 * force_off[2]
                 ),
                 "At 100 N both are met within 10 %; at 120 N it is the trend that differs.",
             ),
-            goes(of("fig13-14", "displacement-falls-with-preload"), (depth, 1, -1.0), (3, "mm of embedding"),
+            goes(loads("displacement-falls-with-preload"), (depth, 1, -1.0), (3, "mm of embedding"),
                 "More preload makes for less elastic displacement in the collision.",
                 "A tread that is pressed harder sinks in deeper; the study says so itself of its \
-                 experiment (figure 22)."
+                 experiment (figure 22).",
             ),
-            goes(of("fig13-14", "displacement-grows-with-speed"), (depth, 2, 1.0), (3, "mm of embedding"),
+            goes(loads("displacement-grows-with-speed"), (depth, 2, 1.0), (3, "mm of embedding"),
                 "A faster wheel has more elastic displacement in the collision.",
-                "The rubber stiffens with speed: under the same load it sinks in less."
+                "The rubber stiffens with speed: under the same load it sinks in less.",
             ),
-            goes(of("fig13-14", "stress-falls-with-preload"), (stress, 1, -1.0), (0, "kPa"),
+            goes(loads("stress-falls-with-preload"), (stress, 1, -1.0), (0, "kPa"),
                 "The impact stress falls (ratio 0.953) when the preload rises from 100 N to 120 N.",
-                "It rises with the force; the area grows less."
+                "It rises with the force; the area grows less.",
             ),
-            goes(of("fig13-14", "stress-grows-with-speed"), (stress, 2, 1.0), (0, "kPa"),
+            goes(loads("stress-grows-with-speed"), (stress, 2, 1.0), (0, "kPa"),
                 "The impact stress grows (ratio 1.038) when the speed rises from 5 mm/s to 8 mm/s.",
-                ""
+                "",
             ),
-            goes(of("fig15-16", "amplitude-falls-with-preload").fitted(), (gap, 1, -1.0), (3, "mm"),
+            goes(gaps("amplitude-falls-with-preload").fitted(), (gap, 1, -1.0), (3, "mm"),
                 "The vibration amplitude (gap) falls from 1.708 mm to 1.557 mm when the preload rises from \
                  100 N to 120 N.",
-                ""
+                "",
             ),
-            goes(of("fig15-16", "amplitude-grows-with-speed").fitted(), (gap, 2, 1.0), (3, "mm"),
+            goes(gaps("amplitude-grows-with-speed").fitted(), (gap, 2, 1.0), (3, "mm"),
                 "The vibration amplitude (gap) grows from 1.708 mm to 1.901 mm when the speed rises from 5 mm/s to 8 mm/s.",
-                ""
+                "",
             ),
-            of("fig15-16", "amplitude-values").fitted().judged(
+            gaps("amplitude-values").fitted().judged(
                 "The three amplitudes are 1.7079, 1.5567 and 1.9014 mm.",
-                largest(gaps) < 0.03,
+                largest(gap_off) < 0.03,
                 format!(
                     "The simulation is off by {:+.1} %, {:+.1} % and {:+.1} %. Fitted: three numbers of \
                      the tread to these three, so that this is no validation.",
-                    100.0 * gaps[0], 100.0 * gaps[1], 100.0 * gaps[2]
+                    100.0 * gap_off[0], 100.0 * gap_off[1], 100.0 * gap_off[2]
                 ),
             ),
-            of("fig15-16", "simulated-amplitudes-resemble-theory").fitted().judged(
+            gaps("simulated-amplitudes-resemble-theory").fitted().judged(
                 "The simulated amplitudes closely resemble the theoretical ones.",
                 largest(alike) < CLOSE,
                 format!(
@@ -250,7 +251,7 @@ impl Amplitudes {
                     100.0 * alike[0], 100.0 * alike[1], 100.0 * alike[2]
                 ),
             ),
-            of("fig15-16", "simulated-curves-resemble-theory").explained(
+            gaps("simulated-curves-resemble-theory").explained(
                 "The simulated amplitude curves closely resemble the theoretical ones throughout the transition.",
                 resemblance < CLOSE,
                 format!(

@@ -71,15 +71,15 @@ pub fn claims(all: &[Histories]) -> Vec<Claim> {
             "At 5 mm/s the collision force of the first transition is smaller at 120 N than at 100 N.",
             "It is larger, as climbing must be: the axial force is the pressing force times the tangent of \
              the angle at which the corner bears. The study contradicts itself here between its first and \
-             its second transition."
+             its second transition.",
         ),
         rises("collision-grows-with-speed", (slow, fast), collision, 1.0,
             "At 100 N the collision is larger at 8 mm/s than at 5 mm/s.",
-            ""
+            "",
         ),
         rises("collision-grows-with-speed-120", (slowest, pressed), collision, 1.0,
             "At 120 N, too, the collision grows with the speed (5 mm/s against 3 mm/s).",
-            ""
+            "",
         ),
         of("second-collision-grows-with-preload").judged(
             "In the second transition more preload makes for a larger force.",
@@ -128,16 +128,16 @@ pub fn claims(all: &[Histories]) -> Vec<Claim> {
         ),
         rises("impact-falls-with-preload", (slow, pressed), impact, -1.0,
             "More preload makes for a smaller impact in the first transition.",
-            "The force grows more than the area on which it acts."
+            "The force grows more than the area on which it acts.",
         ),
         rises("vibration-grows-with-speed", (slow, fast), vibration, 1.0,
             "At the same load and preload the vibration amplitude grows with the speed.",
-            ""
+            "",
         ),
         rises("vibration-falls-with-preload", (slow, pressed), vibration, -1.0,
             "At the same load and speed more preload makes for a smaller vibration amplitude.",
             "The arm's deflection follows the collision force, which grows. What does fall is the gap, which \
-             the study equates with the amplitude: figures 15 and 16."
+             the study equates with the amplitude: figures 15 and 16.",
         ),
     ]
 }

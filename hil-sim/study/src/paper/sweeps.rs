@@ -270,6 +270,10 @@ fn bent(curves: &Curves) -> String {
     )
 }
 
+/// Unit of a length and of an area, with decimals.
+const MM: (&str, usize) = ("mm", 3);
+const MM2: (&str, usize) = ("mm²", 2);
+
 /// A claim about the largest difference between the four means, which are `what`.
 fn spread(
     of: Claim,
@@ -294,19 +298,19 @@ fn spread(
 
 /// Claims about the sweep over the preload: figures 20 and 22.
 pub fn preload_claims(sweep: &Sweep) -> Vec<Claim> {
-    let of = |figure, id| Claim::of(figure, SECTION, id);
+    let [gaps, depths] = ["fig20", "fig22"].map(|figure| move |id| Claim::of(figure, SECTION, id));
     let (gap, depth, area) = (&sweep.gap, &sweep.depth, &sweep.area);
     let gap_spread = gap.experiment.spread();
     let fall = -gap.experiment.rise();
     vec![
-        of("fig20", "gap-falls-with-preload").judged(
+        gaps("gap-falls-with-preload").judged(
             "At constant speed, more preload in the transition leaves a smaller contact gap; all \
              four mean curves show the same trend.",
             all_go(gap, -1.0),
             ends(gap, 3, "mm"),
         ),
-        spread(of("fig20", "gap-spread-preload"), "mean curves of the gap", gap, GAP_SPREAD_MM.0, ("mm", 3)),
-        of("fig20", "errors-do-not-hide-the-trend").judged(
+        spread(gaps("gap-spread-preload"), "mean curves of the gap", gap, GAP_SPREAD_MM.0, MM),
+        gaps("errors-do-not-hide-the-trend").judged(
             "Wear, delayed preload and part tolerances do not hide how the gap depends on the \
              conditions.",
             fall > gap_spread,
@@ -316,37 +320,41 @@ pub fn preload_claims(sweep: &Sweep) -> Vec<Claim> {
                 measured_off(sweep)
             ),
         ),
-        of("fig22", "depth-grows-with-preload").explained(
+        depths("depth-grows-with-preload").explained(
             "At constant speed the embedding depth grows with the preload, nonlinearly.",
             all_go(depth, 1.0) && nonlinear(depth),
             format!("{} {}", ends(depth, 3, "mm"), bent(depth)),
             "It grows, but not all six curves bend to the same side.",
         ),
-        of("fig22", "area-grows-with-depth-preload").judged(
+        depths("area-grows-with-depth-preload").judged(
             "As the embedding depth grows with the preload, so does the contact area.",
             all_go(area, 1.0),
             ends(area, 1, "mm²"),
         ),
-        spread(of("fig22", "depth-spread-preload"), "means of the depth", depth, DEPTH_SPREAD_MM.0, ("mm", 3)),
-        spread(of("fig22", "area-spread-preload"), "means of the area", area, AREA_SPREAD_MM2.0, ("mm²", 2)),
-        spreads_agree(sweep, "fig22", "depth-and-area-spreads-agree-preload", (DEPTH_SPREAD_MM.0, AREA_SPREAD_MM2.0)),
+        spread(depths("depth-spread-preload"), "means of the depth", depth, DEPTH_SPREAD_MM.0, MM),
+        spread(depths("area-spread-preload"), "means of the area", area, AREA_SPREAD_MM2.0, MM2),
+        spreads_agree(
+            depths("depth-and-area-spreads-agree-preload"),
+            sweep,
+            (DEPTH_SPREAD_MM.0, AREA_SPREAD_MM2.0),
+        ),
     ]
 }
 
 /// Claims about the sweep over the speed: figures 21 and 23.
 pub fn speed_claims(sweep: &Sweep, preload: &Sweep) -> Vec<Claim> {
-    let of = |figure, id| Claim::of(figure, SECTION, id);
+    let [gaps, depths] = ["fig21", "fig23"].map(|figure| move |id| Claim::of(figure, SECTION, id));
     let (gap, depth, area) = (&sweep.gap, &sweep.depth, &sweep.area);
     let gap_spread = gap.experiment.spread();
     let other = preload.gap.experiment.spread();
     vec![
-        of("fig21", "gap-grows-with-speed").judged(
+        gaps("gap-grows-with-speed").judged(
             "At constant preload the contact gap grows with the speed, nonlinearly.",
             all_go(gap, 1.0) && nonlinear(gap),
             format!("{} {}", ends(gap, 3, "mm"), bent(gap)),
         ),
-        spread(of("fig21", "gap-spread-speed"), "mean curves of the gap", gap, GAP_SPREAD_MM.1, ("mm", 3)),
-        of("fig21", "speed-spreads-more").explained(
+        spread(gaps("gap-spread-speed"), "mean curves of the gap", gap, GAP_SPREAD_MM.1, MM),
+        gaps("speed-spreads-more").explained(
             "The means differ more over the speed (0.32 mm) than over the preload (0.24 mm), \
              because of wear and momentary slip.",
             gap_spread > 1.1 * other,
@@ -357,7 +365,7 @@ pub fn speed_claims(sweep: &Sweep, preload: &Sweep) -> Vec<Claim> {
             ),
             "The same forty rigs make both sweeps, and their tolerances move the entire curve.",
         ),
-        of("fig23", "depth-grows-with-speed").explained(
+        depths("depth-grows-with-speed").explained(
             "At constant preload the embedding depth grows with the speed.",
             all_go(depth, 1.0),
             ends(depth, 3, "mm"),
@@ -365,34 +373,33 @@ pub fn speed_claims(sweep: &Sweep, preload: &Sweep) -> Vec<Claim> {
              gap grows. A wheel that sank in deeper would be lower over the root of the step \
              and leave a smaller gap, against figure 21.",
         ),
-        of("fig23", "area-grows-with-depth-speed").explained(
+        depths("area-grows-with-depth-speed").explained(
             "The contact area grows with the speed, as the depth does.",
             all_go(area, 1.0),
             ends(area, 1, "mm²"),
             "It falls with the depth, for the same reason.",
         ),
-        of("fig23", "area-follows-depth").judged(
+        depths("area-follows-depth").judged(
             "Contact area and embedding depth change alike.",
             all_go(area, 1.0) == all_go(depth, 1.0) && all_go(area, -1.0) == all_go(depth, -1.0),
             "Both change with the same sign in theory, simulation and all four means.".into(),
         ),
-        spread(of("fig23", "depth-spread-speed"), "means of the depth", depth, DEPTH_SPREAD_MM.1, ("mm", 3)),
-        spread(of("fig23", "area-spread-speed"), "means of the area", area, AREA_SPREAD_MM2.1, ("mm²", 2)),
-        spreads_agree(sweep, "fig23", "depth-and-area-spreads-agree-speed", (DEPTH_SPREAD_MM.1, AREA_SPREAD_MM2.1)),
+        spread(depths("depth-spread-speed"), "means of the depth", depth, DEPTH_SPREAD_MM.1, MM),
+        spread(depths("area-spread-speed"), "means of the area", area, AREA_SPREAD_MM2.1, MM2),
+        spreads_agree(
+            depths("depth-and-area-spreads-agree-speed"),
+            sweep,
+            (DEPTH_SPREAD_MM.1, AREA_SPREAD_MM2.1),
+        ),
     ]
 }
 
 /// Whether a published spread of the area is what geometry makes of that of the depth.
-fn spreads_agree(
-    sweep: &Sweep,
-    figure: &'static str,
-    id: &'static str,
-    (depth_mm, area_mm2): (f64, f64),
-) -> Claim {
+fn spreads_agree(of: Claim, sweep: &Sweep, (depth_mm, area_mm2): (f64, f64)) -> Claim {
     let rise = |curves: &Curves| curves.theory[GRID - 1] - curves.theory[0];
     let per_depth = rise(&sweep.area) / rise(&sweep.depth);
     let expected = per_depth * depth_mm;
-    Claim::of(figure, SECTION, id).explained(
+    of.explained(
         "The published spreads of depth and area belong to one wheel of 25 mm by 28 mm.",
         alike(expected, area_mm2),
         format!(
