@@ -283,17 +283,13 @@ impl Controller {
             Some(Sample { code: make(code?), at: at? })
         }
         let bridges = self.drive_code.zip(self.pretightener_code);
+        let wheel = (self.wheel_encoder_code, self.wheel_encoder_at);
+        let arm = |code| angle_frame(code, self.arm_angle_error);
         SensorFrame {
-            wheel_encoder: sample(
-                self.wheel_encoder_code,
-                self.wheel_encoder_at,
-                EncoderCount::new,
-            ),
+            wheel_encoder: sample(wheel.0, wheel.1, EncoderCount::new),
             preload_sensor: sample(self.preload_code, self.preload_at, AdcCode::new),
             compression_sensor: sample(self.compression_code, self.compression_at, AdcCode::new),
-            arm_angle: sample(self.arm_angle_code, self.arm_angle_at, |code| {
-                angle_frame(code, self.arm_angle_error)
-            }),
+            arm_angle: sample(self.arm_angle_code, self.arm_angle_at, arm),
             bridges: bridges.map(|(drive, pretightener)| BridgeCodes {
                 drive: BridgeCode::new(drive),
                 pretightener: BridgeCode::new(pretightener),
@@ -490,11 +486,8 @@ mod tests {
             let (number, retracts, fault) = split(mode);
             let tick = Controller { mode: number, retracts, fault, ..Controller::default() };
             assert_eq!(tick.mode(), Some(mode));
-            assert!(
-                format!("{mode:?}")
-                    .to_lowercase()
-                    .contains(&MODE_NAMES[usize::from(number)][..4].replace('-', ""))
-            );
+            let name = MODE_NAMES[usize::from(number)][..4].replace('-', "");
+            assert!(format!("{mode:?}").to_lowercase().contains(&name));
         }
         for (mode, retracts) in [(OFF, false), (3, true), (FAULT_HOLD, false), (200, true)] {
             let tick = Controller { mode, retracts, ..Controller::default() };
