@@ -6,7 +6,6 @@ pub mod contact;
 pub mod coordinates;
 pub mod forward;
 pub mod least_squares;
-pub mod noise;
 pub mod plot;
 pub mod published;
 pub mod record;

@@ -17,7 +17,6 @@
 mod drive;
 mod leg;
 pub mod pattern;
-mod profile;
 
 use interstage::rig::Rig;
 
@@ -25,10 +24,9 @@ use crate::montecarlo::RunLine;
 use crate::report::verdict::SLIP_SEEN_MM;
 use crate::scenario::{Direction, Scenario};
 use crate::session::{RunError, initial_rig};
-use drive::Driven;
+use drive::{Driven, Limits};
 use leg::{Leg, Reached, Track};
 use pattern::pattern_search;
-use profile::Limits;
 
 /// Cost of a leg that breaks a bound, s, beside that of by how much.
 const BROKEN_S: f64 = 100.0;
@@ -129,18 +127,18 @@ pub fn search(scenario: &Scenario, bounds: &Bounds, effort: Effort) -> Result<Or
 
 /// The figures of a run that ended like this.
 fn line(seed: u64, driven: &Driven, fails: Option<String>) -> RunLine {
-    let crossings = driven.plant().ledger().crossings();
-    let mu = driven.plant().parameters().mu;
+    let crossings = driven.plant.ledger().crossings();
+    let mu = driven.plant.parameters().mu;
     let gaps = crossings.iter().map(|crossing| crossing.gap_mm);
     let slips = crossings.iter().filter(|crossing| crossing.slip_mm > SLIP_SEEN_MM).count();
-    let slipped = driven.plant().truth().slip_mm > SLIP_SEEN_MM;
+    let slipped = driven.plant.truth().slip_mm > SLIP_SEEN_MM;
     let margins = crossings.iter().map(|crossing| mu - crossing.peak_utilisation);
     RunLine {
         seed,
         completed: fails.is_none(),
         duration_s: Some(driven.time_s()),
         moving_s: driven.moving_s(),
-        max_gap_mm: gaps.fold(driven.peaks().separation_mm, f64::max),
+        max_gap_mm: gaps.fold(driven.peaks.separation_mm, f64::max),
         slip_events: slips.max(usize::from(slipped)),
         least_slip_margin: margins.min_by(f64::total_cmp),
         mean_preload_n: driven.mean_preload_n(),
@@ -186,7 +184,7 @@ impl LegSearch<'_> {
         let (limit, slew) = (self.rig.preload.limit_n, self.rig.preload.slew_n_per_s);
         let mut reached = self.cross(&mut leg)?;
         // The first leg waits for the preload; about how long is found first.
-        let rise_s = (leg.preload_n - self.from.plant().truth().preload_n).max(0.0) / slew;
+        let rise_s = (leg.preload_n - self.from.plant.truth().preload_n).max(0.0) / slew;
         let waits = rise_s > 0.1;
         for part in [0.2, 0.35, 0.5, 0.65, 0.8].into_iter().filter(|_| waits) {
             let mut later = Leg { start_s: part * rise_s, ..leg };

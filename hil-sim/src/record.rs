@@ -6,10 +6,7 @@
 mod columns;
 mod csv_file;
 mod decoder;
-mod drawn;
 mod joined;
-pub(crate) mod json;
-mod ledger;
 mod mcap_file;
 mod probed;
 mod read;
@@ -26,7 +23,6 @@ mod write;
 pub use csv_file::{Metadata, write_metadata};
 pub use decoder::{Counts, Decoder, Item, Mark};
 pub use joined::JoinedLog;
-pub use ledger::LedgerLine;
 pub use mcap_file::{FRAMES, Topic, messages, unwrapped, write_mcap};
 pub use probed::Probed;
 pub use read::{ReadError, log_at, pieces};
@@ -35,7 +31,7 @@ pub use recording::recordings;
 pub use run::{Boot, Cut, Header, Run, Since, Unknown};
 pub use source::{Bytes, Source, SourceError, Virtual, letter, starter};
 pub(crate) use summary::or_nan;
-pub use summary::{CrossingLine, LogLine, Recording, Report, Summary};
+pub use summary::{CrossingLine, LedgerLine, LogLine, Recording, Report, Summary};
 pub use tick::{
     Controller, MODE_NAMES, STAGE_NAMES, Tick, TrueState, mode_number, mode_words, stage_name,
 };

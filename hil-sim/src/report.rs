@@ -5,12 +5,9 @@ mod animated;
 mod animation;
 pub mod axis;
 mod band;
-mod beside;
 mod compare;
 mod crossings;
 mod decimate;
-pub(crate) mod ledger;
-pub mod mesh;
 mod page;
 pub mod palette;
 pub(crate) mod panel;
@@ -21,13 +18,12 @@ mod tables;
 pub(crate) mod verdict;
 
 pub use animated::animated_svg;
-pub use beside::beside_svg;
-pub use compare::{Difference, compare_html, differences, table as compared};
+pub use compare::{Difference, beside_svg, compare_html, differences, table as compared};
 pub(crate) use page::capital;
 pub use page::{Section, html, log_html, page_of};
 pub use panels::overview_svg;
 pub(crate) use scene::Geometry;
-pub(crate) use tables::table;
+pub(crate) use tables::{COLUMNS, slowed_by, table};
 
 #[cfg(test)]
 mod tests;

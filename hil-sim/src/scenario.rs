@@ -2,15 +2,16 @@
 //! the options of the run. A scenario starts from a preset, takes any subset of keys from a
 //! TOML file, and then what `--set key=value` overrides.
 
-mod error;
 pub mod injection;
 mod keys;
 mod merge;
 mod run;
+#[cfg(test)]
+mod tests;
 mod validate;
-mod value;
 
 use std::collections::BTreeMap;
+use std::fmt::Display;
 use std::path::Path;
 
 use interstage::rig::Rig;
@@ -19,14 +20,13 @@ use toml::{Table, Value};
 
 use crate::plant::draw::PlantParameters;
 use crate::plant::mismatch::Mismatch;
-use crate::plant::section::Section;
-use crate::plant::spread::{Noise, Spread};
+use crate::plant::spread::{Noise, Section, Spread};
 
-pub use error::ScenarioError;
 use keys::Kind;
+use merge::{COMMAND_LINE, Merged, Provenance};
+
 pub use keys::{KeyInfo, PRESETS};
 pub(crate) use keys::{leaves, nearest_word};
-use merge::{COMMAND_LINE, Merged, Provenance};
 pub use run::{ControllerKind, Direction, MismatchDraw, RunOptions, StepAnomaly};
 
 /// One rig, its mismatch, its noise and its run.
@@ -48,6 +48,41 @@ pub struct Scenario {
     /// `sources`.
     #[serde(skip)]
     pub sources: BTreeMap<String, String>,
+}
+
+/// A scenario that cannot be used. Displays as one line: where the value was written, its
+/// key, and what was expected.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+pub struct ScenarioError(String);
+
+impl ScenarioError {
+    /// Something is wrong with what `origin` says.
+    fn at(origin: &str, what: impl Display) -> Self {
+        Self(format!("{origin}: {what}"))
+    }
+
+    /// There is no such key; `hint` is the second half of the sentence.
+    fn unknown_key(origin: &str, key: &str, hint: &str) -> Self {
+        Self::at(origin, format!("{key}: no such key{hint}"))
+    }
+
+    /// The value is not what the key takes.
+    fn wrong(origin: &str, key: &str, found: impl Display, expected: impl Display) -> Self {
+        Self::at(origin, format!("{key} = {found}: expected {expected}"))
+    }
+
+    /// The value is outside its range.
+    fn out_of_range(origin: &str, key: &str, value: f64, (min, max): (f64, f64)) -> Self {
+        Self::wrong(origin, key, value, format!("a value from {min} to {max}"))
+    }
+
+    /// A number with a unit behind it.
+    fn unit_in_value(origin: &str, key: &str, found: &str) -> Self {
+        let unit = keys::in_unit(key);
+        let why = if unit.is_empty() { "" } else { ": that is part of the key's name" };
+        Self::wrong(origin, key, found, format!("a bare number{unit}, without the unit{why}"))
+    }
 }
 
 impl Default for Scenario {
@@ -218,7 +253,7 @@ impl Scenario {
                 sources = merge::sources(origin, stated)?;
             }
         }
-        let from_set = sets.iter().rev().filter_map(|text| value::split(text));
+        let from_set = sets.iter().rev().filter_map(|text| merge::split(text));
         let from_set = from_set.filter(|(key, _)| *key == "preset").map(|(_, name)| name).next();
         let mut base = match (from_set.or(preset), from_file) {
             (Some(name), _) => Self::named(name.trim_matches('"'))?,
@@ -270,6 +305,3 @@ pub(crate) fn brief(value: &serde_json::Value) -> String {
 fn no_preset(origin: &str, found: &Value) -> ScenarioError {
     ScenarioError::wrong(origin, "preset", found, Kind::Word(&PRESETS).expected("preset"))
 }
-
-#[cfg(test)]
-mod tests;

@@ -3,7 +3,6 @@
 
 mod cases;
 mod drive;
-mod roll;
 
 use std::collections::BTreeMap;
 use std::convert::Infallible;
@@ -132,8 +131,8 @@ fn pressed_n(case: &StressCase) -> f64 {
 /// The message of the refusal of an impossible case, or why it was not refused by this name.
 fn refused(case: &StressCase, name: &str) -> Result<String, String> {
     match drive::plant(case).check(pressed_n(case)) {
-        Err(refusal) if refusal.name() == name => Ok(refusal.to_string()),
-        Err(refusal) => Err(format!("refused as {}, not as {name}", refusal.name())),
+        Err(refusal) if refusal.name == name => Ok(refusal.to_string()),
+        Err(refusal) => Err(format!("refused as {}, not as {name}", refusal.name)),
         Ok(()) => Err(format!("not refused, though {name}")),
     }
 }
@@ -142,7 +141,7 @@ fn refused(case: &StressCase, name: &str) -> Result<String, String> {
 fn one(case: &StressCase) -> Result<[f64; 6], String> {
     let plant = drive::plant(case);
     plant.check(pressed_n(case)).map_err(|refusal| format!("refused: {refusal}"))?;
-    let rolled = roll::run(case).map_err(|error| format!("ring: {error}"))?;
+    let rolled = drive::roll(case).map_err(|error| format!("ring: {error}"))?;
     let drove = drive::run(case, &plant).map_err(|error| error.to_string())?;
     let deepest = DEEPEST * RADIUS_MM;
     Ok([

@@ -11,7 +11,7 @@ use super::failure::{Failure, Outcome};
 use super::output;
 use super::scenario::ScenarioArgs;
 use crate::plant::balance::Axial;
-use crate::plant::course::{Course, MAX_PRELOAD_N, MAX_SPEED_MM_S};
+use crate::plant::crossing::{Course, MAX_PRELOAD_N, MAX_SPEED_MM_S};
 use crate::plant::crossing::{CrossingCase, cross_along};
 use crate::plant::ring::RingParameters;
 use crate::progress;

@@ -7,8 +7,8 @@ use comfy_table::Table;
 
 use super::output::wrote;
 use crate::record::{CrossingLine, Report, Summary};
-use crate::report::ledger::{COLUMNS, slowed_by};
 use crate::report::verdict::{Grade, gap_sentence, headline, origin, slip_sentence, verdict};
+use crate::report::{COLUMNS, slowed_by};
 use crate::table::{number, plain};
 
 /// Most columns of a run's text, and of its table with every column.

@@ -5,8 +5,7 @@ use plotters::style::text_anchor::{HPos, VPos};
 
 use super::{Cell, Envelope};
 use crate::compare::STRATEGIES;
-use crate::report::axis::{Scale, label};
-use crate::report::mesh;
+use crate::report::axis::{self, Scale, label};
 use crate::report::palette;
 use crate::report::svg::{self, Area, Drawn, SCALE, font};
 use crate::scenario::ControllerKind;
@@ -36,7 +35,7 @@ pub fn picture(envelope: &Envelope) -> String {
 
 /// What the colours say.
 fn legend(head: &Area) -> Drawn {
-    let style = || font(mesh::TEXT_PX, palette::TEXT, HPos::Left, VPos::Center);
+    let style = || font(axis::TEXT_PX, palette::TEXT, HPos::Left, VPos::Center);
     for (colour, text, (left, middle)) in [
         (palette::OUTCOMES[0], "completes without slip: seconds from the command", (14, 15)),
         (palette::OUTCOMES[1], "completes, but slips", (14, 37)),
@@ -78,7 +77,7 @@ fn map(envelope: &Envelope, area: &Area, known: bool, controller: ControllerKind
         .x_label_area_size(38 * S)
         .y_label_area_size(42 * S)
         .build_cartesian_2d(Scale::new(x, ticks(frictions)), Scale::new(y, ticks(loads)))?;
-    mesh::plain(&mut chart.configure_mesh())
+    axis::plain(&mut chart.configure_mesh())
         .x_label_formatter(&|x| label(*x, 1))
         .y_label_formatter(&|y| label(*y, 0))
         .x_desc("friction")

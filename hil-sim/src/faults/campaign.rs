@@ -2,7 +2,6 @@
 
 mod case;
 mod matrix;
-pub mod operator;
 mod twin;
 
 use std::borrow::Cow;
@@ -21,8 +20,7 @@ use crate::session::{self, Options, RunError, RunningRig, Session};
 
 pub use case::Case;
 pub use matrix::{MatrixRow, MedianAndWorst, Outcome};
-use operator::Operator;
-pub use twin::Twin;
+pub use twin::{Operator, Twin};
 
 /// How long a run is watched after its end, s.
 pub const AFTER_S: f64 = 1.0;

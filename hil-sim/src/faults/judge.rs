@@ -51,7 +51,7 @@ pub enum Finding {
 }
 
 /// Bounds of the mechanism, which follow from the rig.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 struct Bounds {
     preload_n: f64,
     motion_mm: f64,
@@ -85,7 +85,7 @@ impl Bounds {
 }
 
 /// The record of a run under judgement.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Judge {
     bounds: Bounds,
     /// Codes that name what was injected; none if all do.
@@ -127,17 +127,10 @@ impl Judge {
             bounds: Bounds::of(&scenario.rig, slips),
             codes,
             ends_mm: (0.0, scenario.rig.rig.travel_mm),
-            off_mm: 0.0,
             position_mm: truth.position_mm,
-            asked_mm_s: 0.0,
-            peak_preload_n: 0.0,
-            motion_mm: 0.0,
-            fault: None,
-            limits: Vec::new(),
-            rest_s: None,
-            mode: Mode::Boot,
             commanded,
             reset: reset.map(|fault| fault.kind),
+            ..Self::default()
         }
     }
 
@@ -156,10 +149,8 @@ impl Judge {
         self.peak_preload_n = self.peak_preload_n.max(truth.preload_n);
         self.motion_mm += self.uncommanded(moved_mm);
         if let Mode::Complete(direction) = self.mode {
-            let end_mm = match direction {
-                Direction::Deploy => self.ends_mm.1,
-                Direction::Retract => self.ends_mm.0,
-            };
+            let (stow_mm, end_mm) = self.ends_mm;
+            let end_mm = if direction == Direction::Deploy { end_mm } else { stow_mm };
             self.off_mm = self.off_mm.max((self.position_mm - end_mm).abs());
         }
         for entry in &output.events {
@@ -182,10 +173,7 @@ impl Judge {
             Mode::Run(direction, _) | Mode::Stopping(direction) => direction,
             _ => return moved_mm.abs(),
         };
-        let along = match direction {
-            Direction::Deploy => moved_mm,
-            Direction::Retract => -moved_mm,
-        };
+        let along = f64::from(direction.sign()) * moved_mm;
         let most = (BEYOND.0 * self.asked_mm_s + BEYOND.1) * TICK_S;
         let back = BEYOND.1 * TICK_S;
         (along - most).max(-along - back).max(0.0)

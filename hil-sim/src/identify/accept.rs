@@ -5,7 +5,7 @@ use toml::Table;
 
 use super::coordinates::{FRICTION, LOAD, STIFFENING, STIFFNESS, TAU};
 use super::forward::{CHANNELS, quotient};
-use super::noise::Noise;
+use super::least_squares::Noise;
 use super::record::Record;
 use super::result::{Fit, Identification, Parameter, fitted, place_of};
 use super::{IdentifyError, contact};

@@ -11,8 +11,8 @@ use nalgebra::DMatrix;
 
 use super::IdentifyError;
 use super::forward::{Run, Trajectory};
+use super::least_squares::Noise;
 use super::least_squares::{Model, covariance, minimise};
-use super::noise::Noise;
 use super::record::{Record, Sample, TICK_S};
 
 /// Dead time, ms.

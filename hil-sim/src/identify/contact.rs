@@ -12,8 +12,8 @@ use nalgebra::DMatrix;
 use super::IdentifyError;
 use super::coordinates::{CREEP, Coordinates, FRICTION};
 use super::forward::{Channels, Run, Trajectory, derivatives, quotient, simulate};
+use super::least_squares::Noise;
 use super::least_squares::{Model, consider, minimise, robust};
-use super::noise::Noise;
 
 /// Deviations that the first fit assumes: compression, mm, angle, mrad, effort, N; ten
 /// times those of the sensors, as the start may be far off.

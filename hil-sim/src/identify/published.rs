@@ -60,24 +60,18 @@ impl Model for Gaps<'_> {
 
     /// Gaps over the published ones, less 1, for these logarithms.
     fn at(&self, x: &[f64]) -> Option<Vec<f64>> {
-        let (elements, stride_mm) = self.fineness;
+        let rig = &self.scenario.rig;
         let k_inf = x[0].exp();
         let ring = RingParameters {
             k_inf,
             k_0: k_inf * x[1].exp(),
             tau_s: x[2].exp(),
-            ..RingParameters::of(&self.scenario.rig, elements)
+            ..RingParameters::of(rig, self.fineness.0)
         };
         let deviation = |case: usize| {
             let (speed_mm_s, preload_n) = CASES[case];
-            let crossing = CrossingCase {
-                ring,
-                step_height_mm: self.scenario.rig.rig.step_height_mm,
-                speed_mm_s,
-                preload_n,
-                axial: Axial::Pushed,
-                stride_mm,
-            };
+            let of = (speed_mm_s, preload_n, Axial::Pushed);
+            let crossing = CrossingCase { ring, ..CrossingCase::of(rig, self.fineness, of) };
             cross(&crossing).ok().map(|result| result.gap_mm / AMPLITUDE_MM[case] - 1.0)
         };
         (0..3).into_par_iter().map(deviation).collect()

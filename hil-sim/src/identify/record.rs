@@ -195,9 +195,6 @@ impl Reader {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::record::{write_csv, write_mcap};
-    use crate::session::{self, RunningRig};
-    use interstage::supervise::{Command, Mode};
 
     fn record(ticks: &[u32]) -> Result<Record, IdentifyError> {
         let sample = |tick: u32| Sample { counts: f64::from(tick), ..Sample::default() };
@@ -243,33 +240,6 @@ mod tests {
         frame.wheel_encoder = Some(At { code: EncoderCount::new(4), at: 1 });
         let second = reader.sample(&frame, &Drives::default());
         assert_eq!((second.counts, second.arm_rad), (4.0, None));
-    }
-
-    #[test]
-    fn both_files_of_a_run_give_the_codes_of_the_sensors() {
-        let mut scenario = Scenario::default();
-        scenario.run.seed = 3;
-        let directory = tempfile::tempdir().unwrap();
-        let recording = session::run(&scenario, session::Options::ROWS).unwrap();
-        let (csv, mcap) = (directory.path().join("log.csv"), directory.path().join("log.mcap"));
-        write_csv(&recording, &csv).unwrap();
-        write_mcap(&recording, &mcap).unwrap();
-        let [csv, mcap] = [csv, mcap].map(|path| Record::read(&path, Some(&scenario)).unwrap());
-        assert_eq!(csv.samples.len(), mcap.samples.len());
-        assert_eq!(mcap.scenario, scenario);
-        assert_eq!(csv.samples, mcap.samples);
-
-        let mut session = session::Session::new(&scenario, session::Options::default()).unwrap();
-        let mut reader = Reader::new(&scenario);
-        let mut start = Some(Command::Start);
-        for coded in &mcap.samples {
-            let idle = session.mode() == Mode::Idle;
-            let command = if idle { start.take() } else { None };
-            let frame = session.sense();
-            let output = session.advance(&frame, command).unwrap();
-            let sample = reader.sample(&frame, &session::drives(output.drive, output.preload));
-            assert_eq!(&sample, coded, "the codes are the sensors' own");
-        }
     }
 
     #[test]

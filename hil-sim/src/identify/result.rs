@@ -14,7 +14,7 @@ use super::coordinates::{
     STIFFNESS, TAU, TREAD_GAIN,
 };
 use super::forward::{CHANNELS, Run};
-use super::noise::Noise;
+use super::least_squares::Noise;
 use super::record::Record;
 use super::traces::Zero;
 use crate::scenario::Scenario;

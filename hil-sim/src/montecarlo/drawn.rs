@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use crate::plant::mismatch::Mismatch;
-use crate::plant::section::Section;
+use crate::plant::spread::Section;
 use crate::scenario::{MismatchDraw, Scenario};
 
 /// A key that differs from run to run, or by which the runs differ from the rig that the

@@ -2,8 +2,7 @@
 
 use interstage::rig::Rig;
 
-use super::drive::Driven;
-use super::profile::Limits;
+use super::drive::{Driven, Limits};
 use super::{BROKEN_S, Bounds};
 use crate::plant::draw::PlantParameters;
 use crate::report::verdict::SLIP_SEEN_MM;
@@ -128,10 +127,10 @@ impl<'a> Track<'a> {
         while driven.along_mm() < last && driven.time_s() < until_s {
             driven.step(leg.start_s, slow, leg.preload_n)?;
         }
-        let plant = driven.plant();
+        let plant = &driven.plant;
         let crossing = plant.ledger().crossings().get(index);
         let gap = crossing.map_or(f64::INFINITY, |crossing| crossing.gap_mm);
-        let peaks = driven.peaks();
+        let peaks = driven.peaks;
         let used = crossing.map_or(self.mu, |crossing| crossing.peak_utilisation);
         let over = |value: f64, most: f64| (value / most - 1.0).max(0.0);
         let legs_left = (self.len() - 1 - index) as f64;

@@ -1,7 +1,9 @@
-//! The two motors: the drive with gearbox and current limit, the pre-tightener
+//! The two motors: the drive with gearbox, current limit and play, the pre-tightener
 //! with dead time, lag, slew and spring.
 
 use std::collections::VecDeque;
+
+use super::draw::PlantParameters;
 
 /// Time constant with which a wheel stops whose bridge is switched off, s.
 pub(super) const STOPS_IN_S: f64 = 0.003;
@@ -173,6 +175,21 @@ impl Pretightener {
         }
     }
 
+    /// That of a plant with this dead time, s.
+    pub fn of(
+        p: &PlantParameters,
+        delay_s: f64,
+        dt_s: f64,
+        seat_n: f64,
+        range: (f64, f64),
+    ) -> Self {
+        Self::new(p.slew_n_per_s, p.lag_s, delay_s, dt_s, seat_n, range).with_losses(
+            p.screw_droop,
+            p.screw_friction,
+            p.preload_limit_n,
+        )
+    }
+
     /// The same with a motor whose speed falls by the part `droop` as it raises `limit_n`, and
     /// with friction that takes this part of full duty. At `limit_n` it still gives its slew.
     pub fn with_losses(mut self, droop: f64, friction: f64, limit_n: f64) -> Self {
@@ -224,6 +241,46 @@ impl Pretightener {
     /// spring adds its rate times what the wheel has moved inwards.
     pub fn seat_n(&self) -> f64 {
         self.seat
+    }
+}
+
+/// Play of the drive: the wheel between the flanks of its gear.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Play {
+    /// Travel of the tread from flank to flank, mm.
+    width_mm: f64,
+    /// How far the tread has run ahead of the flank that drives it forwards, mm.
+    ahead_mm: f64,
+    /// Speed of the motor, as travel of the tread, while the wheel is free, mm/s.
+    free: Option<f64>,
+}
+
+impl Play {
+    /// Play of this width, mm, the wheel on the flank that drives it forwards.
+    pub const fn new(width_mm: f64) -> Self {
+        Self { width_mm, ahead_mm: 0.0, free: None }
+    }
+
+    /// Speed of the motor while the wheel is between the flanks, mm/s.
+    pub const fn motor_mm_s(&self) -> Option<f64> {
+        self.free
+    }
+
+    /// The flank in contact had to push with this force, N, positive forwards, at this speed of
+    /// the motor: it cannot pull, and lets go.
+    pub fn pushed(&mut self, force_n: f64, motor_mm_s: f64) {
+        let leaves =
+            force_n < 0.0 && self.ahead_mm < self.width_mm || force_n > 0.0 && self.ahead_mm > 0.0;
+        self.free = leaves.then_some(motor_mm_s);
+    }
+
+    /// Free of the flanks the tread has travelled this much farther than the motor, mm, which
+    /// ended with this speed. Returns whether it is still free.
+    pub fn travelled(&mut self, farther_mm: f64, motor_mm_s: f64) -> bool {
+        let ahead = self.ahead_mm + farther_mm;
+        self.ahead_mm = ahead.clamp(0.0, self.width_mm);
+        self.free = (ahead == self.ahead_mm).then_some(motor_mm_s);
+        self.free.is_some()
     }
 }
 
@@ -379,5 +436,24 @@ mod tests {
         assert!(at[100] > 0.0);
         // Ramp minus delay and lag: 25 * (1 - 0.08 - 0.06).
         assert!((at[999] - 21.5).abs() < 0.05, "{}", at[999]);
+    }
+
+    #[test]
+    fn a_flank_pushes_and_never_pulls() {
+        let mut play = Play::new(0.1);
+        play.pushed(5.0, 3.0);
+        assert_eq!(play.motor_mm_s(), None);
+        play.pushed(-1.0, 3.0);
+        assert_eq!(play.motor_mm_s(), Some(3.0));
+        assert!(play.travelled(0.06, 2.0));
+        assert!(!play.travelled(0.06, 1.0));
+        play.pushed(-1.0, 1.0);
+        assert_eq!(play.motor_mm_s(), None);
+        play.pushed(1.0, 1.0);
+        assert!(!play.travelled(-0.2, 1.0));
+        // Without play it never lets go.
+        let mut none = Play::new(0.0);
+        none.pushed(-1.0, 1.0);
+        assert_eq!(none.motor_mm_s(), None);
     }
 }

@@ -1,4 +1,6 @@
-//! The inclined drive arm: geometry, and its first modes as oscillators.
+//! The inclined drive arm: geometry, friction of its pivot, and its first modes as oscillators.
+
+use interstage::rig::Rig;
 
 /// Geometry of the arm.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -12,6 +14,12 @@ pub struct Arm {
 }
 
 impl Arm {
+    /// That of a rig.
+    pub fn of(rig: &Rig) -> Self {
+        let (length_mm, pivot_mm) = (rig.rig.arm_length_mm, rig.rig.arm_pivot_radius_mm);
+        Self { length_mm, pivot_mm, coupling: rig.plant.arm_coupling }
+    }
+
     /// Angle from the pillar with the wheel centre at this radius, rad.
     pub fn angle(&self, radius_mm: f64) -> f64 {
         ((radius_mm - self.pivot_mm) / self.length_mm).clamp(-1.0, 1.0).asin()
@@ -62,7 +70,7 @@ pub struct Ripple {
 
 /// One mode of the arm: a damped oscillator, integrated exactly for a sinusoidal force and one
 /// that runs linearly.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Mode {
     /// Circular frequency, rad/s.
     omega: f64,
@@ -89,17 +97,7 @@ impl Mode {
     pub fn new(parameters: ModeParameters) -> Self {
         let ModeParameters { frequency_hz, damping: zeta, mass_kg, shape } = parameters;
         let omega = std::f64::consts::TAU * frequency_hz;
-        Self {
-            omega,
-            zeta,
-            stiffness: mass_kg * omega * omega * 1e-3,
-            shape,
-            held: 0.0,
-            deflection: 0.0,
-            rate: 0.0,
-            step: 0.0,
-            propagator: [[1.0, 0.0], [0.0, 1.0]],
-        }
+        Self { omega, zeta, stiffness: mass_kg * omega * omega * 1e-3, shape, ..Self::default() }
     }
 
     /// Advances by `dt_s` under `force` and a force that runs from one value to the other, N:
@@ -158,6 +156,37 @@ impl Mode {
             [-decay * w * w / damped * sin, decay * (cos - z * w / damped * sin)],
         ];
         self.step = dt_s;
+    }
+}
+
+/// Travel over which the pivot's friction turns round, mm at the wheel. Chosen, so that it is
+/// softer than the tread.
+const TURNS_IN_MM: f64 = 0.05;
+
+/// Coulomb friction in the arm's pivot that turns round over a short travel (Dahl's model,
+/// linear up to its bound).
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Pivot {
+    /// Friction, N at the wheel.
+    friction_n: f64,
+    /// Travel since friction turned round, mm, bounded either way.
+    bent_mm: f64,
+}
+
+impl Pivot {
+    /// A pivot with this friction, N at the wheel, relaxed.
+    pub const fn new(friction_n: f64) -> Self {
+        Self { friction_n, bent_mm: 0.0 }
+    }
+
+    /// The wheel has moved by this towards the pillar, mm.
+    pub fn follow(&mut self, rise_mm: f64) {
+        self.bent_mm = (self.bent_mm + rise_mm).clamp(-TURNS_IN_MM, TURNS_IN_MM);
+    }
+
+    /// Force that presses the wheel to the wall, N: against its motion.
+    pub fn force_n(&self) -> f64 {
+        self.friction_n * self.bent_mm / TURNS_IN_MM
     }
 }
 
@@ -227,5 +256,18 @@ mod tests {
         assert!((arm.angle(125.0).to_degrees() - 46.397).abs() < 1e-2);
         assert!(arm.thrust_ratio(125.0) > arm.thrust_ratio(113.0));
         assert!(arm.thrust_ratio(113.0) > 0.8);
+    }
+
+    #[test]
+    fn friction_presses_against_the_motion_up_to_its_bound() {
+        let mut pivot = Pivot::new(2.0);
+        assert_eq!(pivot.force_n(), 0.0);
+        pivot.follow(0.025);
+        assert_eq!(pivot.force_n(), 1.0);
+        pivot.follow(3.0);
+        assert_eq!(pivot.force_n(), 2.0);
+        // Both bounds apart: the hysteresis.
+        pivot.follow(-0.1);
+        assert_eq!(pivot.force_n(), -2.0);
     }
 }

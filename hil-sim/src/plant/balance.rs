@@ -72,6 +72,11 @@ const NEAR: f64 = 1e-4;
 const FOREVER_S: f64 = 1e9;
 
 impl Balance {
+    /// A constant radial force on the wheel, N.
+    pub const fn under(preload_n: f64, axial: Axial) -> Self {
+        Self { preload_n, spring_n_per_mm: 0.0, arm_n: 0.0, axial }
+    }
+
     /// Residual of the radial balance, N, its slope, N/mm, and the utilisation, from
     /// the contact's cosine and sine sums, N, and their derivatives by height, N/mm.
     pub fn residual(
@@ -129,8 +134,7 @@ impl Balance {
         preload_n: f64,
     ) -> Result<Solved, BalanceError> {
         let motion = Motion { wall, height_mm, turn_rad: 0.0, dt_s: FOREVER_S };
-        let balance = Self { preload_n, spring_n_per_mm: 0.0, arm_n: 0.0, axial: Axial::Pushed };
-        let solved = balance.solve(ring, motion)?;
+        let solved = Self::under(preload_n, Axial::Pushed).solve(ring, motion)?;
         ring.commit(&Motion { height_mm: solved.height_mm, ..motion });
         Ok(solved)
     }
@@ -249,19 +253,11 @@ mod tests {
     use crate::plant::grip::Gives;
     use crate::plant::ring::RingParameters;
     use crate::plant::wall::{Step, Wall};
+    use interstage::rig::Rig;
 
     /// A ring on both floor and corner, and a motion that leaves it there.
     fn climbing() -> (Ring, Motion) {
-        let ring = Ring::new(RingParameters {
-            radius_mm: 25.0,
-            width_mm: 28.0,
-            k_inf: 0.6044,
-            k_0: 0.6044 * 4.2235,
-            tau_s: 0.1059,
-            elements: 1440,
-            tread_thickness_mm: 0.0,
-            second_relaxation: 1.0,
-        });
+        let ring = Ring::new(RingParameters::of(&Rig::fe(), 1440));
         let wall = Wall::new(vec![Step { position_mm: 13.0, height_mm: 4.0 }]).local(0.0);
         (ring, Motion { wall, height_mm: 24.8, turn_rad: 0.0, dt_s: 0.2 })
     }
@@ -380,8 +376,7 @@ mod tests {
     #[test]
     fn a_preload_that_nothing_carries_is_told() {
         let (mut ring, motion) = climbing();
-        let balance =
-            Balance { preload_n: 1e9, spring_n_per_mm: 0.0, arm_n: 0.0, axial: Axial::Pushed };
+        let balance = Balance::under(1e9, Axial::Pushed);
         let error = balance.solve(&mut ring, motion).unwrap_err();
         assert_eq!(error.preload_n, 1e9);
         assert!(error.to_string().starts_with("radial balance: no wheel height carries"));

@@ -193,20 +193,13 @@ impl PlantParameters {
         Self {
             ring: RingParameters {
                 radius_mm,
-                width_mm: rig.rig.wheel_width_mm,
                 k_inf,
                 k_0: k_inf * stiffening,
                 tau_s,
-                elements: ELEMENTS,
-                tread_thickness_mm: 0.0,
-                second_relaxation: 1.0,
+                ..RingParameters::of(rig, ELEMENTS)
             },
             wall: Wall::new(steps),
-            arm: Arm {
-                length_mm: rig.rig.arm_length_mm,
-                pivot_mm: rig.rig.arm_pivot_radius_mm,
-                coupling: rig.plant.arm_coupling,
-            },
+            arm: Arm::of(rig),
             wall_radius_mm: rig.rig.wall_radius_mm,
             stops_mm: (-STOP_ROOM_MM, rig.rig.travel_mm + STOP_ROOM_MM),
             mu,

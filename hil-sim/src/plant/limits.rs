@@ -19,87 +19,23 @@ pub const HIGHEST: f64 = 0.85;
 pub const CRUSHED: f64 = 0.65;
 
 /// A combination of parameters that cannot be computed, because it cannot be.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-pub enum Refusal {
-    /// Preload on the corner.
-    #[error(
-        "preload.limit_n, with the load through the arm {force_n:.1} N, on tread.k_inf_pa_per_m = {k_inf_pa_per_m:.3e} presses a corner {depth_mm:.1} mm deep: at most {most_mm:.1} mm"
-    )]
-    Sinks {
-        /// Radial force, N.
-        force_n: f64,
-        /// Relaxed stiffness, Pa/m.
-        k_inf_pa_per_m: f64,
-        /// Depth, mm.
-        depth_mm: f64,
-        /// Largest depth, mm.
-        most_mm: f64,
-    },
-    /// Preload on a corner of a thin tread.
-    #[error(
-        "preload.limit_n, with the load through the arm {force_n:.1} N, presses a corner {depth_mm:.1} mm deep into mismatch.tread_thickness_mm = {thickness_mm:.1}: at most {most_mm:.1} mm"
-    )]
-    Crushes {
-        /// Radial force, N.
-        force_n: f64,
-        /// Depth, mm.
-        depth_mm: f64,
-        /// Thickness of the tread, mm.
-        thickness_mm: f64,
-        /// Largest depth, mm.
-        most_mm: f64,
-    },
-    /// Momentum and friction together.
-    #[error(
-        "plant.mu = {mu:.2} on a corner that leans by {tangent:.2} drags a wheel down that is braked, and plant.moved_mass_kg = {mass_kg:.3} at {speed_mm_s:.0} mm/s brings {energy_mj:.0} mJ, of which the tread takes at most {most_mj:.0} mJ"
-    )]
-    Digs {
-        /// Friction.
-        mu: f64,
-        /// Tangent of the direction to the corner.
-        tangent: f64,
-        /// Moved mass, kg.
-        mass_kg: f64,
-        /// Largest speed, mm/s.
-        speed_mm_s: f64,
-        /// Kinetic energy, mJ.
-        energy_mj: f64,
-        /// Energy that the tread takes, mJ.
-        most_mj: f64,
-    },
-    /// Step and depth together.
-    #[error(
-        "rig.step_height_mm = {step_mm:.1}, the corner {depth_mm:.1} mm deep in the tread, reaches as high as the hub of a wheel of {radius_mm:.1} mm: at most {most_mm:.1} mm together"
-    )]
-    Towers {
-        /// Step, mm.
-        step_mm: f64,
-        /// Depth of its corner, mm.
-        depth_mm: f64,
-        /// Radius of the wheel, mm.
-        radius_mm: f64,
-        /// Largest sum, mm.
-        most_mm: f64,
-    },
-}
-
-impl Refusal {
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{text}")]
+pub struct Refusal {
     /// Its name in counts.
-    pub const fn name(&self) -> &'static str {
-        match self {
-            Self::Sinks { .. } => "preload sinks the wheel",
-            Self::Crushes { .. } => "preload crushes the tread",
-            Self::Digs { .. } => "braked wheel digs itself in",
-            Self::Towers { .. } => "corner as high as the hub",
-        }
-    }
+    pub name: &'static str,
+    /// The parameters, what they come to, and the limit.
+    pub text: String,
 }
 
-/// Depth of a right-angled corner in the relaxed tread under this force, mm: two faces
-/// at 45 degrees, `F = k L d^2`.
-fn corner_depth(plant: &PlantParameters, force_n: f64) -> f64 {
-    (force_n / (plant.ring.k_inf * plant.ring.width_mm)).sqrt()
-}
+/// Name of a refusal: preload on the corner.
+pub const SINKS: &str = "preload sinks the wheel";
+/// Preload on a corner of a thin tread.
+pub const CRUSHES: &str = "preload crushes the tread";
+/// Momentum and friction together.
+pub const DIGS: &str = "braked wheel digs itself in";
+/// Step and depth together.
+pub const TOWERS: &str = "corner as high as the hub";
 
 impl PlantParameters {
     /// Whether the rig can be run under preloads up to `preload_n`.
@@ -108,23 +44,45 @@ impl PlantParameters {
     /// The [`Refusal`] that names the parameters and their limit.
     pub fn check(&self, preload_n: f64) -> Result<(), Refusal> {
         let radius_mm = self.ring.radius_mm;
-        let k_inf_pa_per_m = self.ring.k_inf * 1e9;
         let most_mm = DEEPEST * radius_mm;
         let wedge = self.arm.thrust_ratio(self.wall_radius_mm - radius_mm);
         let force_n = preload_n + (wedge * self.load_n).max(0.0);
-        let depth_mm = corner_depth(self, force_n);
+        // In a right-angled corner of the relaxed tread, two faces at 45 degrees: `F = k L d^2`.
+        let depth_mm = (force_n / (self.ring.k_inf * self.ring.width_mm)).sqrt();
+        let refused = |name, text| Err(Refusal { name, text });
+        let pressed = format!("preload.limit_n, with the load through the arm {force_n:.1} N");
         if depth_mm > most_mm || depth_mm.is_nan() {
-            return Err(Refusal::Sinks { force_n, k_inf_pa_per_m, depth_mm, most_mm });
+            return refused(
+                SINKS,
+                format!(
+                    "{pressed}, on tread.k_inf_pa_per_m = {:.3e} presses a corner {depth_mm:.1} mm \
+                     deep: at most {most_mm:.1} mm",
+                    1e9 * self.ring.k_inf
+                ),
+            );
         }
         let thickness_mm = self.ring.tread_thickness_mm;
         let most_mm = CRUSHED * thickness_mm;
         if self.ring.is_coupled() && depth_mm > most_mm {
-            return Err(Refusal::Crushes { force_n, depth_mm, thickness_mm, most_mm });
+            return refused(
+                CRUSHES,
+                format!(
+                    "{pressed}, presses a corner {depth_mm:.1} mm deep into \
+                     mismatch.tread_thickness_mm = {thickness_mm:.1}: at most {most_mm:.1} mm"
+                ),
+            );
         }
         let step_mm = self.wall.steps().iter().fold(0.0f64, |most, s| most.max(s.height_mm));
         let most_mm = HIGHEST * radius_mm;
         if step_mm + depth_mm > most_mm {
-            return Err(Refusal::Towers { step_mm, depth_mm, radius_mm, most_mm });
+            return refused(
+                TOWERS,
+                format!(
+                    "rig.step_height_mm = {step_mm:.1}, the corner {depth_mm:.1} mm deep in the \
+                     tread, reaches as high as the hub of a wheel of {radius_mm:.1} mm: at most \
+                     {most_mm:.1} mm together"
+                ),
+            );
         }
         let tangent = leans(radius_mm, step_mm + depth_mm);
         let (mass_kg, speed_mm_s) = (self.mass_kg, self.drive.no_load_mm_s);
@@ -132,7 +90,14 @@ impl PlantParameters {
         let most_mj = takes(&self.ring, step_mm);
         let mu = self.mu * (1.0 + self.friction_waves.0);
         if mu * tangent >= 1.0 && energy_mj > most_mj {
-            return Err(Refusal::Digs { mu, tangent, mass_kg, speed_mm_s, energy_mj, most_mj });
+            return refused(
+                DIGS,
+                format!(
+                    "plant.mu = {mu:.2} on a corner that leans by {tangent:.2} drags a wheel down \
+                     that is braked, and plant.moved_mass_kg = {mass_kg:.3} at {speed_mm_s:.0} mm/s \
+                     brings {energy_mj:.0} mJ, of which the tread takes at most {most_mj:.0} mJ"
+                ),
+            );
         }
         Ok(())
     }
@@ -181,19 +146,19 @@ mod tests {
         let mut soft = nominal();
         soft.ring.k_inf = 1e-3;
         let refusal = soft.check(50.0).unwrap_err();
-        assert!(matches!(refusal, Refusal::Sinks { .. }));
+        assert_eq!(refusal.name, SINKS);
         assert!(refusal.to_string().contains("on tread.k_inf_pa_per_m = 1.000e6"), "{refusal}");
         let mut high = nominal();
         high.wall = crate::plant::wall::Wall::new(vec![crate::plant::wall::Step {
             position_mm: 20.0,
             height_mm: 20.5,
         }]);
-        assert!(matches!(high.check(50.0), Err(Refusal::Towers { .. })));
+        assert_eq!(high.check(50.0).unwrap_err().name, TOWERS);
         (high.load_n, high.mu) = (0.0, 0.1);
         assert_eq!(high.check(5.0), Ok(()));
         // Braked, it would dig itself in, if it were heavy enough for that.
         high.mu = 1.1;
-        assert!(matches!(high.check(5.0), Err(Refusal::Digs { .. })));
+        assert_eq!(high.check(5.0).unwrap_err().name, DIGS);
         high.mass_kg = 0.1;
         assert_eq!(high.check(5.0), Ok(()));
         let mut thin = nominal();
@@ -206,7 +171,7 @@ mod tests {
         heavy.ring.k_inf = 0.02;
         assert_eq!(heavy.check(48.0), Ok(()));
         heavy.load_n = 20.0;
-        assert!(matches!(heavy.check(48.0), Err(Refusal::Sinks { .. })));
+        assert_eq!(heavy.check(48.0).unwrap_err().name, SINKS);
         heavy.arm.coupling = -1.0;
         assert_eq!(heavy.check(48.0), Ok(()));
     }

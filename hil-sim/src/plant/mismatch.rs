@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::draw::PlantParameters;
 use super::ring::RingParameters;
-use super::section::{Field, Section, section};
+use super::spread::{Field, Section, section};
 use super::wall::Form;
 
 section! {

@@ -10,7 +10,6 @@ use super::balance::{Axial, BalanceError};
 use super::crossing::{CrossingCase, cross};
 use super::draw::ELEMENTS;
 use super::rig::Resolution;
-use super::ring::RingParameters;
 
 /// How much finer the reference is, in elements and in stride.
 pub const FINER: usize = 20;
@@ -33,6 +32,11 @@ impl Setting {
     /// This much finer in both.
     pub fn finer(self, times: usize) -> Self {
         Self { elements: self.elements * times, stride_mm: self.stride_mm / times as f64 }
+    }
+
+    /// Elements and stride.
+    pub const fn both(self) -> (usize, f64) {
+        (self.elements, self.stride_mm)
     }
 
     /// From coarse to fine: the settings of the curve.
@@ -70,23 +74,6 @@ pub fn cases() -> Vec<(f64, f64, Axial)> {
     all
 }
 
-/// One of them at a setting.
-#[must_use]
-pub fn case(
-    rig: &Rig,
-    setting: Setting,
-    (speed, preload, axial): (f64, f64, Axial),
-) -> CrossingCase {
-    CrossingCase {
-        ring: RingParameters::of(rig, setting.elements),
-        step_height_mm: rig.rig.step_height_mm,
-        speed_mm_s: speed,
-        preload_n: preload,
-        axial,
-        stride_mm: setting.stride_mm,
-    }
-}
-
 /// Errors of isolated crossings at these settings, against the usual one made
 /// [`FINER`] times as fine; `done` is called after every crossing of the reference.
 ///
@@ -101,7 +88,7 @@ pub fn work_precision(
     let reference = Setting::usual().finer(FINER);
     let mut exact = Vec::new();
     for of in cases() {
-        let result = cross(&case(rig, reference, of))?;
+        let result = cross(&CrossingCase::of(rig, reference.both(), of))?;
         exact.push((of, result.gap_mm, result.corner_force_n));
         done();
     }
@@ -117,7 +104,7 @@ pub fn work_precision(
             let mut least = f64::INFINITY;
             for _ in 0..repeats.max(1) {
                 let started = Instant::now();
-                let result = cross(&case(rig, setting, of))?;
+                let result = cross(&CrossingCase::of(rig, setting.both(), of))?;
                 least = least.min(started.elapsed().as_nanos() as f64);
                 point.gap_error = point.gap_error.max((result.gap_mm / gap_mm - 1.0).abs());
                 let force = (result.corner_force_n / force_n - 1.0).abs();

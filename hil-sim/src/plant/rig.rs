@@ -1,28 +1,27 @@
 //! The complete rig, a millisecond at a time.
 
-mod booking;
 mod contact;
-mod error;
+mod energy;
 mod intervention;
 mod traction;
 mod truth;
-mod vibration;
 
-use super::actuators::Pretightener;
-use super::arm::Mode;
-use super::balance::Balance;
-use super::draw::PlantParameters;
-use super::energy::Energy;
-use super::ledger::Ledger;
-use super::play::{Pivot, Play};
-use super::ring::{Ring, Work};
-use super::rolling::{self, Steady};
-use super::wind_up::WindUp;
+use std::f64::consts::TAU;
+
 use contact::SettleTimer;
 use traction::Stride;
 
-pub use error::PlantError;
-pub use truth::Truth;
+use super::actuators::{Play, Pretightener};
+use super::arm::{Mode, Pivot, Ripple};
+use super::balance::Balance;
+use super::draw::PlantParameters;
+use super::ledger::Ledger;
+use super::ring::{Ring, Work};
+use super::rolling::{self, Steady};
+use super::wind_up::WindUp;
+
+pub use energy::Energy;
+pub use truth::{PlantError, Truth};
 
 /// How much farther the screw retreats than each step is high, mm.
 const STEP_ROOM_MM: f64 = 1.0;
@@ -156,19 +155,7 @@ impl VirtualRig {
         let steps = parameters.wall.steps().iter();
         let highest_mm: f64 = steps.map(|step| step.height_mm.max(0.0) + STEP_ROOM_MM).sum();
         let range = (-parameters.spring_n_per_mm * highest_mm, parameters.seat_max_n);
-        let preload = Pretightener::new(
-            parameters.slew_n_per_s,
-            parameters.lag_s,
-            parameters.delay_s,
-            dt_s,
-            seat,
-            range,
-        )
-        .with_losses(
-            parameters.screw_droop,
-            parameters.screw_friction,
-            parameters.preload_limit_n,
-        );
+        let preload = Pretightener::of(&parameters, parameters.delay_s, dt_s, seat, range);
         let modes = parameters.modes.iter().map(|&mode| Mode::new(mode)).collect();
         let mut rig = Self {
             resolution: Resolution::default(),
@@ -377,5 +364,48 @@ impl VirtualRig {
     fn preload_now(&self) -> f64 {
         let rise = self.truth.height_mm - self.eccentric().1 - self.parameters.ring.radius_mm;
         (self.preload.seat_n() + self.parameters.spring_n_per_mm * rise).max(0.0)
+    }
+}
+
+impl VirtualRig {
+    /// Force of the contact on the arm's modes, N: what the tread has to push with against load
+    /// and step, by the torque that the motor on the arm holds against it. By the direction of
+    /// the contact's force, so that neither the modes' own force nor the carriage's inertia,
+    /// which both follow a tick late, drives them.
+    fn excitation_n(&self) -> f64 {
+        let (_, cosine, sine) = self.forces;
+        if cosine <= 0.0 {
+            return 0.0;
+        }
+        let (leans, load) = (sine / cosine, self.parameters.load_n);
+        let pressed = self.preload_now() + self.thrust_ratio() * self.thrust_n;
+        let carried = ((pressed - load * leans) / (1.0 + leans * leans)).max(0.0);
+        let friction = self.parameters.friction_at(self.truth.position_mm);
+        (load + leans * carried).min(friction * carried)
+    }
+
+    /// Modes of the arm, forced by the torque ripple of motor and gearbox and by the load that
+    /// the contact puts on the drive.
+    fn vibrate(&mut self, dt_s: f64) {
+        let load_n = self.excitation_n();
+        let load = (std::mem::replace(&mut self.excitation_n, load_n), load_n);
+        let (amplitude, pitch) = self.parameters.ripple;
+        let spin = self.truth.tread_mm_s;
+        let tread = self.truth.rotation_rad * self.parameters.ring.radius_mm;
+        let to = (TAU * (tread / pitch).fract()).sin_cos();
+        let force = Ripple {
+            amplitude_n: if spin == 0.0 { 0.0 } else { amplitude },
+            omega: TAU * spin / pitch,
+            from: std::mem::replace(&mut self.ripple_phase, to),
+            to,
+        };
+        let (mut deflection, mut sum) = (0.0, 0.0);
+        for mode in &mut self.modes {
+            mode.step(&force, load, dt_s);
+            deflection += mode.deflection_mm();
+            sum += mode.force_n();
+        }
+        self.truth.vibration_mm = deflection;
+        self.vibration_n = sum / self.modes.len().max(1) as f64;
     }
 }

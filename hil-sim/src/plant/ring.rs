@@ -8,7 +8,7 @@
 //! With `tread_thickness_mm` the elements are coupled as a layer of incompressible rubber
 //! couples them (`coupled`); with `second_relaxation` the rubber relaxes twice (`law`).
 //!
-//! Only elements that can touch are visited (`window`), four at a time (`sweep`). The
+//! Only elements that can touch are visited (`layout`), four at a time (`sweep`). The
 //! memory of the others is brought up to date in closed form when they come back.
 
 mod complementarity;
@@ -17,21 +17,17 @@ mod law;
 pub(super) mod layer;
 mod layout;
 mod parameters;
-mod resultants;
 mod sweep;
-mod window;
 
 use std::f64::consts::TAU;
 
 use super::wall::LocalWall;
 use coupled::Coupled;
 use law::{Lanes, Law};
-use layout::Ready;
+use layout::{LANES, Ready, Window};
 use sweep::{Place, Sums};
-use window::{LANES, Window};
 
-pub use parameters::RingParameters;
-pub use resultants::Contact;
+pub use parameters::{Contact, RingParameters};
 
 /// What a ring has been made to compute.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

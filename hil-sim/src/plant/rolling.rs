@@ -315,18 +315,10 @@ mod tests {
     use crate::plant::balance::{Axial, Balance};
     use crate::plant::ring::{Motion, Ring};
     use crate::plant::wall::Wall;
+    use interstage::rig::Rig;
 
     fn ring() -> RingParameters {
-        RingParameters {
-            radius_mm: 25.0,
-            width_mm: 28.0,
-            k_inf: 0.6044,
-            k_0: 0.6044 * 4.2235,
-            tau_s: 0.1059,
-            elements: 5760,
-            tread_thickness_mm: 0.0,
-            second_relaxation: 1.0,
-        }
+        RingParameters::of(&Rig::fe(), 5760)
     }
 
     #[test]
@@ -363,12 +355,7 @@ mod tests {
             let steady = solve(&ring(), speed, 24.8, |c| c.cosine_n - preload);
             let mut rolled = Ring::new(ring());
             let wall = Wall::default().local(0.0);
-            let balance = Balance {
-                preload_n: preload,
-                spring_n_per_mm: 0.0,
-                arm_n: 0.0,
-                axial: Axial::Pushed,
-            };
+            let balance = Balance::under(preload, Axial::Pushed);
             let dx = 0.01f64.copysign(speed);
             let mut height = 24.8;
             let mut contact = None;

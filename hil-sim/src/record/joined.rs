@@ -13,6 +13,7 @@ use crate::scenario::Scenario;
 
 /// A run's record as it grows. The log comes some milliseconds after its tick, so the record is
 /// made at the end.
+#[derive(Default)]
 pub struct JoinedLog {
     /// Number of the board's first tick, which counts as 0.
     first: Tick,
@@ -33,17 +34,7 @@ pub struct JoinedLog {
 impl JoinedLog {
     /// A log whose first tick has this number.
     pub fn new(first: Tick) -> Self {
-        Self {
-            first,
-            decoder: Decoder::new(),
-            ticks: VecDeque::new(),
-            events: VecDeque::new(),
-            truths: Vec::new(),
-            identity: None,
-            latest: 0,
-            start: 0,
-            last: 0,
-        }
+        Self { first, ..Self::default() }
     }
 
     /// Adds the plant before the next millisecond.

@@ -10,11 +10,11 @@ use interstage::tick::{Entry, Event};
 use mcap::WriteOptions;
 use mcap::records::{MessageHeader, Metadata};
 use serde::Serialize;
-use serde_json::Value;
+use serde_json::{Map, Value, json};
 
 use super::{
     Controller, CrossingLine, Decoder, Item, LedgerLine, MODE_NAMES, Recording, STAGE_NAMES,
-    Summary, Tick, TrueState, json, pieces, text,
+    Summary, Tick, TrueState, pieces, text,
 };
 use crate::files::{Failure, FileError, atomic_write};
 
@@ -92,14 +92,7 @@ impl Topic {
     pub(crate) const LIVE: [Self; 3] = [Self::Tick, Self::Log, Self::Ledger];
 
     pub const fn name(self) -> &'static str {
-        match self {
-            Self::Tick => "/tick",
-            Self::Log => "/log",
-            Self::Ledger => "/ledger",
-            Self::Crossing => "/crossing",
-            Self::Summary => "/summary",
-            Self::Frames => FRAMES,
-        }
+        ["/tick", "/log", "/ledger", "/crossing", "/summary", FRAMES][self as usize]
     }
 
     /// JSON schema of its messages; null for frames, which are protobuf.
@@ -111,20 +104,20 @@ impl Topic {
                     &interstage::sense::raw::SensorFrame::default(),
                 );
                 let tick = Tick { controller, truth: Some(TrueState::default()) };
-                let mut schema = json::schema("interstage.Tick", &tick, &["tick", "t_s", "mode"]);
-                json::enumerate(&mut schema, "mode", &MODE_NAMES);
-                json::enumerate(&mut schema, "stage", &STAGE_NAMES);
+                let mut schema = flat_schema("interstage.Tick", &tick, &["tick", "t_s", "mode"]);
+                enumerate(&mut schema, "mode", &MODE_NAMES);
+                enumerate(&mut schema, "stage", &STAGE_NAMES);
                 schema
             }
-            Self::Log => json::log_schema(),
+            Self::Log => log_schema(),
             Self::Ledger => {
-                json::schema("interstage.Ledger", &LedgerLine::default(), &["index", "count"])
+                flat_schema("interstage.Ledger", &LedgerLine::default(), &["index", "count"])
             }
             Self::Crossing => {
                 let required = ["index", "touch_s", "lift_s"];
-                json::schema("interstage.Crossing", &CrossingLine::default(), &required)
+                flat_schema("interstage.Crossing", &CrossingLine::default(), &required)
             }
-            Self::Summary => json::schema("interstage.Summary", &Summary::default(), &[]),
+            Self::Summary => flat_schema("interstage.Summary", &Summary::default(), &[]),
             Self::Frames => Value::Null,
         }
     }
@@ -140,9 +133,9 @@ pub fn messages(item: &Item) -> Option<(Topic, Vec<u8>)> {
         Item::Ledger(line) => body(Topic::Ledger, &LedgerLine::from(line)),
         Item::Event(entry) => {
             let ns = u64::from(entry.at) * TICK_NS;
-            body(Topic::Log, &json::log_message(ns, level(entry), &text(&entry.event)))
+            body(Topic::Log, &log_message(ns, level(entry), &text(&entry.event)))
         }
-        Item::Mark(mark) => body(Topic::Log, &json::log_message(0, WARNING, &mark.to_string())),
+        Item::Mark(mark) => body(Topic::Log, &log_message(0, WARNING, &mark.to_string())),
         Item::Identity(_) | Item::Plan(..) | Item::Request(..) | Item::CaptureChunk(_) => None,
     }
 }
@@ -153,7 +146,7 @@ fn body(topic: Topic, message: &impl Serialize) -> Option<(Topic, Vec<u8>)> {
 }
 
 fn bytes(message: &impl Serialize) -> serde_json::Result<Vec<u8>> {
-    serde_json::to_vec(&json::object(message)?)
+    serde_json::to_vec(&object(message)?)
 }
 
 fn level(entry: &Entry) -> u8 {
@@ -251,7 +244,7 @@ pub fn write_mcap(recording: &Recording, path: &Path) -> Result<(), FileError> {
             all.push((tick.controller.t_s, Topic::Tick, bytes(tick)?));
         }
         for line in &recording.log {
-            let message = json::log_message(nanoseconds(line.t_s), INFO, &line.text);
+            let message = log_message(nanoseconds(line.t_s), INFO, &line.text);
             all.push((line.t_s, Topic::Log, bytes(&message)?));
         }
         for line in &recording.summary.crossings {
@@ -294,6 +287,73 @@ fn about(summary: &Summary) -> [(String, String); 7] {
 /// Time since boot, ns; 0 for times before boot.
 fn nanoseconds(t_s: f64) -> u64 {
     (t_s * 1e9).round() as u64
+}
+
+/// `message` as a JSON object without the fields that have no value.
+fn object(message: &impl Serialize) -> serde_json::Result<Value> {
+    let mut value = serde_json::to_value(message)?;
+    if let Value::Object(fields) = &mut value {
+        fields.retain(|_, field| !field.is_null());
+    }
+    Ok(value)
+}
+
+/// A JSON schema named `title` of flat objects like `example`. Fields outside `required` may
+/// be absent from a message.
+fn flat_schema(title: &str, example: &impl Serialize, required: &[&str]) -> Value {
+    let example = serde_json::to_value(example).unwrap_or_default();
+    let properties: Map<String, Value> = example
+        .as_object()
+        .into_iter()
+        .flatten()
+        .map(|(name, value)| (name.clone(), json!({ "type": kind(value) })))
+        .collect();
+    json!({ "title": title, "type": "object", "properties": properties, "required": required })
+}
+
+/// States the texts that a property may have.
+fn enumerate(schema: &mut Value, property: &str, names: &[&str]) {
+    schema["properties"][property] = json!({ "type": "string", "enum": names });
+}
+
+/// The form of a log line that viewers show in their log panel.
+fn log_schema() -> Value {
+    json!({
+        "title": "foxglove.Log",
+        "type": "object",
+        "properties": {
+            "timestamp": {
+                "type": "object",
+                "title": "time",
+                "properties": { "sec": { "type": "integer" }, "nsec": { "type": "integer" } },
+            },
+            "level": { "type": "integer" },
+            "message": { "type": "string" },
+            "name": { "type": "string" },
+        },
+    })
+}
+
+/// A log line of this form at a time in ns.
+fn log_message(ns: u64, level: u8, text: &str) -> Value {
+    json!({
+        "timestamp": { "sec": ns / 1_000_000_000, "nsec": ns % 1_000_000_000 },
+        "level": level,
+        "message": text,
+        "name": "interstage",
+    })
+}
+
+fn kind(value: &Value) -> &'static str {
+    match value {
+        Value::Bool(_) => "boolean",
+        Value::Number(n) if !n.is_f64() => "integer",
+        // A number without a value in the example.
+        Value::Number(_) | Value::Null => "number",
+        Value::Array(_) => "array",
+        Value::Object(_) => "object",
+        Value::String(_) => "string",
+    }
 }
 
 #[cfg(test)]

@@ -5,17 +5,20 @@ use interstage::restart::Restart;
 use interstage::supervise::{Mode, ServiceDuties};
 use interstage::tick::{CrossingRecord, Entry, Event, Telemetry};
 use interstage::units::{Direction, Duty, Q16};
+use serde_json::{Map, Value, json};
 use sha2::{Digest, Sha256};
 
 use super::tick::MOVES;
 use super::time_lost::TimeSplit;
 use super::{
-    Controller, CrossingLine, LogLine, Recording, Report, Summary, Tick, drawn, mode_number,
-    mode_words, stage_name,
+    Controller, CrossingLine, LogLine, Recording, Report, Summary, Tick, mode_number, mode_words,
+    stage_name,
 };
+use crate::plant::draw::PlantParameters;
 use crate::plant::ledger::Crossing;
 use crate::plant::rig::{Truth, VirtualRig};
-use crate::scenario::Scenario;
+use crate::plant::spread::Section;
+use crate::scenario::{MismatchDraw, Scenario};
 use crate::session::{TICK_S, longest_s};
 
 /// Largest distance from the end of travel after arrival, mm: twice the effect of creep and
@@ -30,11 +33,10 @@ pub struct RunRecorder {
     /// One row a tick, if they are kept.
     rows: Vec<Tick>,
     log: Vec<LogLine>,
-    faults: Vec<Report>,
-    limits: Vec<Report>,
     /// Crossings as the controller reported them, and when, s.
     reported: Vec<(f64, CrossingRecord)>,
-    gap_ref_mm: f64,
+    /// Reference gap, faults, limits, and what restarted the controller after the command.
+    summary: Summary,
     start_mm: f64,
     commanded: Option<f64>,
     run_started: Option<f64>,
@@ -43,15 +45,14 @@ pub struct RunRecorder {
     moving: u32,
     worst_separation: f64,
     split: TimeSplit,
-    /// What restarted the controller after the command.
-    restart: Option<String>,
     passed: u32,
 }
 
 impl RunRecorder {
     /// A run from `start_mm` with this reference gap, mm.
     pub fn new(gap_ref_mm: f64, start_mm: f64) -> Self {
-        Self { gap_ref_mm, start_mm, ..Self::default() }
+        let summary = Summary { gap_ref_mm, ..Summary::default() };
+        Self { summary, start_mm, ..Self::default() }
     }
 
     /// Time at which this tick began, s.
@@ -72,16 +73,12 @@ impl RunRecorder {
         digest(&mut self.digest, telemetry);
         for Entry { event, .. } in events {
             self.log.push(LogLine { t_s, text: text(event) });
-            match reported(t_s, event) {
-                Some((true, fault)) => self.faults.push(fault),
-                Some((false, limit)) => self.limits.push(limit),
-                None => {}
-            }
+            self.summary.take(t_s, event);
             match event {
                 Event::Crossing(record) => self.reported.push((t_s, *record)),
                 // Under way, it ends the run.
                 Event::Restart(restart) if self.commanded.is_some() => {
-                    self.restart = Some(restart_words(*restart));
+                    self.summary.restart = Some(restart_words(*restart));
                 }
                 Event::Mode(Mode::Preload(_)) => self.accept_command(),
                 _ => {}
@@ -128,16 +125,14 @@ impl RunRecorder {
         let truth = plant.truth();
         let steps = plant.parameters().wall.steps().len();
         let there = arrived.is_some_and(|direction| {
-            let end_mm = match direction {
-                Direction::Deploy => scenario.rig.rig.travel_mm,
-                Direction::Retract => 0.0,
-            };
+            let deploys = direction == Direction::Deploy;
+            let end_mm = if deploys { scenario.rig.rig.travel_mm } else { 0.0 };
             (truth.position_mm - end_mm).abs() <= ARRIVED_WITHIN_MM
         });
         let crossings: Vec<CrossingLine> =
             plant.ledger().crossings().iter().map(|c| crossing_line(c, &self.reported)).collect();
         let worst = crossings.iter().map(|c| c.gap_mm).fold(self.worst_separation, f64::max);
-        let completed = there && crossings.len() == steps && self.faults.is_empty();
+        let completed = there && crossings.len() == steps && self.summary.faults.is_empty();
         let cruise_mm_s = scenario.rig.drive.cruise_speed_mm_s;
         let has_gap = !crossings.is_empty() || worst > 0.0;
         let total_s = self.time_s();
@@ -150,9 +145,7 @@ impl RunRecorder {
             seed: scenario.run.seed,
             version: env!("CARGO_PKG_VERSION").to_owned(),
             overrides: scenario.overrides(),
-            drawn: drawn::of(plant.parameters(), scenario),
-            measured: false,
-            missing: Vec::new(),
+            drawn: drawn(plant.parameters(), scenario),
             commanded_s: self.run_started.and(self.commanded),
             duration_s: self.run_started.and(self.commanded).map(|from| self.run_ended - from),
             moving_s: self.run_started.map_or(0.0, |from| self.run_ended - from),
@@ -160,19 +153,16 @@ impl RunRecorder {
             total_s,
             cut_off_s: Some(longest_s(&scenario.rig)).filter(|longest_s| total_s >= *longest_s),
             travel_mm: (truth.position_mm - self.start_mm).abs(),
-            gap_ref_mm: self.gap_ref_mm,
             max_gap_mm: if has_gap { worst } else { f64::NAN },
             slip_mm: truth.slip_mm,
             mean_preload_n: self.preload_sum / f64::from(self.moving.max(1)),
             energy_j: truth.work_mj * 1e-3,
             wear_j: truth.wear_mj * 1e-3,
-            faults: self.faults,
-            limits: self.limits,
             injected: scenario.run.faults.iter().map(ToString::to_string).collect(),
             real_time_factor: total_s / wall_s.max(1e-9),
             trace_digest: self.digest.finalize().iter().map(|b| format!("{b:02x}")).collect(),
-            restart: self.restart,
             crossings,
+            ..self.summary
         };
         Recording {
             summary,
@@ -227,14 +217,16 @@ fn digest(digest: &mut Sha256, seen: &Telemetry) {
     digest.update(seen.pretightener.to_bits().to_le_bytes());
 }
 
-/// Code and sentence of a fault or a limit, and whether it is a fault.
-pub(super) fn reported(t_s: f64, event: &Event) -> Option<(bool, Report)> {
-    let (latched, code, text) = match event {
-        Event::Fault(fault) => (true, fault.code(), fault.sentence()),
-        Event::Limit(limit) => (false, limit.code(), limit.sentence()),
-        _ => return None,
-    };
-    Some((latched, Report { t_s, code, text: text.to_owned() }))
+impl Summary {
+    /// Takes the report of a fault or a limit, if the event is one.
+    pub(super) fn take(&mut self, t_s: f64, event: &Event) {
+        let (all, code, text) = match event {
+            Event::Fault(fault) => (&mut self.faults, fault.code(), fault.sentence()),
+            Event::Limit(limit) => (&mut self.limits, limit.code(), limit.sentence()),
+            _ => return,
+        };
+        all.push(Report { t_s, code, text: text.to_owned() });
+    }
 }
 
 /// An event as one line of text.
@@ -281,6 +273,41 @@ pub fn text(event: &Event) -> String {
 /// What restarted the target, and what it did before.
 pub(super) fn restart_words(restart: Restart) -> String {
     restart.to_string().replacen("started: ", "", 1)
+}
+
+/// The value that the plant has of each key that its seed draws; of `mismatch.*` where that is
+/// drawn. Lists are one value a step.
+fn drawn(plant: &PlantParameters, scenario: &Scenario) -> Map<String, Value> {
+    let share = scenario.rig.plant.top_load_share;
+    let steps = plant.wall.steps();
+    let positions: Vec<f64> = steps.iter().map(|step| step.position_mm).collect();
+    let heights: Vec<f64> = steps.iter().map(|step| step.height_mm).collect();
+    let top_load_n = if share > 0.0 { plant.load_n / share } else { 0.0 };
+    let drawn = [
+        ("tread.k_inf_pa_per_m", json!(1e9 * plant.ring.k_inf)),
+        ("tread.stiffening", json!(plant.ring.k_0 / plant.ring.k_inf)),
+        ("tread.tau_s", json!(plant.ring.tau_s)),
+        ("plant.mu", json!(plant.mu)),
+        ("plant.top_load_n", json!(top_load_n)),
+        ("rig.wheel_radius_mm", json!(plant.ring.radius_mm)),
+        ("rig.step_positions_mm", json!(positions)),
+        ("rig.step_height_mm", json!(heights)),
+        ("preload.spring_n_per_mm", json!(plant.spring_n_per_mm)),
+        ("preload.delay_s", json!(plant.delay_s)),
+        ("preload.lag_s", json!(plant.lag_s)),
+        ("preload.slew_n_per_s", json!(plant.slew_n_per_s)),
+        ("preload sensor gain", json!(plant.sensors.preload_sensor_gain)),
+        ("compression sensor gain", json!(plant.sensors.tread_gain)),
+        ("arm angle zero, deg", json!(plant.sensors.angle_zero_rad.to_degrees())),
+    ];
+    let mut all: Map<String, Value> =
+        drawn.into_iter().map(|(key, value)| (key.to_owned(), value)).collect();
+    if scenario.run.mismatch != MismatchDraw::Stated && scenario.run.seed > 0 {
+        let mismatch = scenario.drawn_mismatch();
+        let values = mismatch.values();
+        all.extend(values.map(|(field, value)| (format!("mismatch.{}", field.name), json!(value))));
+    }
+    all
 }
 
 #[cfg(test)]
@@ -354,5 +381,30 @@ mod tests {
         assert_eq!(cut_off(120_000).cut_off_s, Some(120.0));
         let said = crate::report::verdict::headline(&cut_off(120_000));
         assert!(said.starts_with("Did not complete within 120 s: "), "{said}");
+    }
+
+    #[test]
+    fn the_nominal_plant_has_the_values_of_its_scenario_and_a_seed_others() {
+        let drawn = |set: &str| {
+            let scenario = Scenario::resolve(None, None, &[set.to_owned()]).unwrap();
+            (super::drawn(&scenario.plant(), &scenario), scenario)
+        };
+        let (nominal, scenario) = drawn("run.seed=0");
+        let value = |key: &str| nominal[key].as_f64().unwrap();
+        let rig = &scenario.rig;
+        for (key, stated) in [
+            ("tread.k_inf_pa_per_m", rig.tread.k_inf_pa_per_m),
+            ("tread.stiffening", rig.tread.stiffening),
+            ("tread.tau_s", rig.tread.tau_s),
+            ("plant.mu", rig.plant.mu),
+            ("plant.top_load_n", rig.plant.top_load_n),
+            ("rig.wheel_radius_mm", rig.rig.wheel_radius_mm),
+            ("preload.delay_s", rig.preload.delay_s),
+            ("preload.lag_s", rig.preload.lag_s),
+        ] {
+            assert!((value(key) / stated - 1.0).abs() < 1e-9, "{key} {} {stated}", value(key));
+        }
+        let (other, _) = drawn("run.seed=5");
+        assert!(other.iter().all(|(key, value)| nominal[key] != *value), "{other:?}");
     }
 }

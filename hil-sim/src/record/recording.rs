@@ -16,7 +16,7 @@ use mcap::records::Record;
 use serde_json::Value;
 
 use super::read::{MCAP, ReadError, content, is_table, parameters, records};
-use super::recorder::{reported, restart_words, text};
+use super::recorder::{restart_words, text};
 use super::time_lost::{TimeLost, TimeSplit};
 use super::{Controller, CrossingLine, LedgerLine, LogLine, Recording, Run, Summary, Tick};
 use crate::scenario::Scenario;
@@ -95,11 +95,7 @@ fn measured(run: &Run) -> Recording {
     for entry in &run.events {
         let t_s = f64::from(entry.at) * 1e-3;
         log.push(LogLine { t_s, text: text(&entry.event) });
-        match reported(t_s, &entry.event) {
-            Some((true, fault)) => summary.faults.push(fault),
-            Some((false, limit)) => summary.limits.push(limit),
-            None => {}
-        }
+        summary.take(t_s, &entry.event);
     }
     summary.completed &= summary.faults.is_empty();
     summary.crossings = run.ledger.iter().map(|line| crossing(run, line)).collect();

@@ -17,6 +17,7 @@ use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize};
 
 use super::columns::{ANGLE, angle_error, angle_frame, bit, mode_column, stage_column};
+use super::summary::nan;
 use crate::plant::rig::Truth;
 
 /// Names of the numbers in [`Controller::mode`].
@@ -282,17 +283,13 @@ impl Controller {
             Some(Sample { code: make(code?), at: at? })
         }
         let bridges = self.drive_code.zip(self.pretightener_code);
+        let wheel = (self.wheel_encoder_code, self.wheel_encoder_at);
+        let arm = |code| angle_frame(code, self.arm_angle_error);
         SensorFrame {
-            wheel_encoder: sample(
-                self.wheel_encoder_code,
-                self.wheel_encoder_at,
-                EncoderCount::new,
-            ),
+            wheel_encoder: sample(wheel.0, wheel.1, EncoderCount::new),
             preload_sensor: sample(self.preload_code, self.preload_at, AdcCode::new),
             compression_sensor: sample(self.compression_code, self.compression_at, AdcCode::new),
-            arm_angle: sample(self.arm_angle_code, self.arm_angle_at, |code| {
-                angle_frame(code, self.arm_angle_error)
-            }),
+            arm_angle: sample(self.arm_angle_code, self.arm_angle_at, arm),
             bridges: bridges.map(|(drive, pretightener)| BridgeCodes {
                 drive: BridgeCode::new(drive),
                 pretightener: BridgeCode::new(pretightener),
@@ -386,10 +383,6 @@ pub struct TrueState {
     pub vibration_true_um: f64,
 }
 
-fn nan() -> f64 {
-    f64::NAN
-}
-
 impl From<&Truth> for TrueState {
     fn from(truth: &Truth) -> Self {
         Self {
@@ -415,9 +408,23 @@ impl Tick {
         self.truth.as_ref().map_or(f64::NAN, of)
     }
 
+    /// A true quantity, or where there is no truth the controller's.
+    pub fn known(
+        &self,
+        truth: impl Fn(&TrueState) -> f64,
+        controller: impl Fn(&Controller) -> f64,
+    ) -> f64 {
+        self.truth.as_ref().map_or_else(|| controller(&self.controller), truth)
+    }
+
     /// Axial position, mm: the true one, or by odometry where there is none.
     pub fn position_mm(&self) -> f64 {
-        self.truth.map_or(self.controller.position_mm, |truth| truth.position_true_mm)
+        self.known(|truth| truth.position_true_mm, |seen| seen.position_mm)
+    }
+
+    /// Compression of the tread, mm: the true one, or as it was measured.
+    pub fn compression_mm(&self) -> f64 {
+        self.known(|truth| truth.compression_true_mm, |seen| seen.compression_mm)
     }
 }
 
@@ -479,11 +486,8 @@ mod tests {
             let (number, retracts, fault) = split(mode);
             let tick = Controller { mode: number, retracts, fault, ..Controller::default() };
             assert_eq!(tick.mode(), Some(mode));
-            assert!(
-                format!("{mode:?}")
-                    .to_lowercase()
-                    .contains(&MODE_NAMES[usize::from(number)][..4].replace('-', ""))
-            );
+            let name = MODE_NAMES[usize::from(number)][..4].replace('-', "");
+            assert!(format!("{mode:?}").to_lowercase().contains(&name));
         }
         for (mode, retracts) in [(OFF, false), (3, true), (FAULT_HOLD, false), (200, true)] {
             let tick = Controller { mode, retracts, ..Controller::default() };

@@ -1,9 +1,15 @@
-//! Ranges and tick marks of axes.
+//! Ranges and tick marks of axes; grid, axes and their text.
 
 use std::ops::Range;
 
+use plotters::chart::MeshStyle;
 use plotters::coord::ranged1d::{DefaultFormatting, KeyPointHint, Ranged};
 use plotters::coord::types::RangedCoordf64;
+use plotters::prelude::DrawingBackend;
+use plotters::style::{Color, TRANSPARENT};
+
+use super::palette;
+use super::svg::size;
 
 pub use crate::table::label;
 
@@ -70,6 +76,23 @@ pub fn ticks(range: (f64, f64), most: usize) -> (Vec<f64>, usize) {
     let last = (range.1 / step + 1e-9).floor() as i64;
     let decimals = (-(step * 1.000_001).log10().floor()).max(0.0) as usize;
     ((first..=last).map(|n| n as f64 * step).collect(), decimals)
+}
+
+/// Text of axes, CSS pixels.
+pub const TEXT_PX: f64 = 12.0;
+
+/// Lines at the ticks and none between them, and the text of a plot. A plot may override them
+/// afterwards.
+pub fn plain<'m, 'a, 'b, X: Ranged, Y: Ranged, DB: DrawingBackend>(
+    mesh: &'m mut MeshStyle<'a, 'b, X, Y, DB>,
+) -> &'m mut MeshStyle<'a, 'b, X, Y, DB> {
+    let text = || ("sans-serif", size(TEXT_PX), &palette::TEXT);
+    mesh.light_line_style(TRANSPARENT)
+        .bold_line_style(palette::GRID.stroke_width(2))
+        .axis_style(palette::AXIS.stroke_width(2))
+        .x_label_style(text())
+        .y_label_style(text())
+        .axis_desc_style(text())
 }
 
 #[cfg(test)]

@@ -1,14 +1,17 @@
-//! Two runs side by side, crossing by crossing.
+//! Two runs side by side: crossing by crossing, and in the same plots over time.
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::ledger::{COLUMNS, Column};
+use plotters::style::RGBColor;
+
 use super::page::{SIZE, end, folded, head, section};
-use super::panels::{Across, figure};
+use super::panel::{Line, Look, Marks, Panel, Shape, stacked};
+use super::panels::{Across, View, figure};
 use super::svg::escape;
+use super::tables::{COLUMNS, Column};
 use super::verdict::{Grade, gap_sentence, headline, origin, verdict};
-use super::{beside, tables};
-use crate::record::{CrossingLine, Recording};
+use super::{axis, palette, tables};
+use crate::record::{CrossingLine, Recording, Tick};
 use crate::scenario::{brief, leaves};
 use crate::table::number;
 
@@ -91,7 +94,7 @@ pub fn compare_html((name_a, a): (&str, &Recording), (name_b, b): (&str, &Record
     };
     let more = folded("The other quantities", &ledger(&rest));
     page += &section("Crossing by crossing", &(ledger(&first) + &more));
-    let plots: String = beside::panels([("A", a), ("B", b)])
+    let plots: String = panels([("A", a), ("B", b)])
         .iter()
         .rev()
         .map(|panel| figure(panel, Across::Time, SIZE, &panel.title))
@@ -127,6 +130,71 @@ pub fn table(differences: &[Difference]) -> (Vec<String>, Vec<Vec<String>>) {
             vec![index.to_string(), format!("{quantity}{unit}"), a, b, change]
         });
     (head, rows.collect())
+}
+
+/// Size of the picture, CSS pixels: its text can still be read at 400.
+const PICTURE: (u32, u32) = (640, 860);
+/// Colours of the two.
+const COLOURS: [RGBColor; 2] = [palette::PRELOAD, palette::SPEED];
+
+/// The picture of two runs with their names: preload, position, slip and gap.
+pub fn beside_svg(runs: [(&str, &Recording); 2]) -> String {
+    let own = runs.map(|(name, run)| (name, run.since_command()));
+    stacked(PICTURE, &mut panels([(own[0].0, &own[0].1), (own[1].0, &own[1].1)]))
+}
+
+/// Gap, preload, speed, position and slip of two runs with their names, each since its command.
+fn panels(runs: [(&str, &Recording); 2]) -> Vec<Panel> {
+    let views = runs.map(|(_, run)| View::new(run, Across::Time));
+    let x = (views[0].x.0.min(views[1].x.0), views[0].x.1.max(views[1].x.1));
+    let line = |of: &dyn Fn(&Tick) -> f64| -> Vec<Line> {
+        let all = views.iter().zip(runs).zip(COLOURS);
+        all.map(|((view, (name, _)), colour)| {
+            let points = view.rows.iter().map(|row| (row.controller.t_s, of(row))).collect();
+            Line { name: name.to_owned().into(), look: Look::Other(colour), points }
+        })
+        .collect()
+    };
+    let panel = |title: &str, y_name, of: &dyn Fn(&Tick) -> f64| Panel {
+        x,
+        lines: line(of),
+        shades: Vec::new(),
+        rules: Vec::new(),
+        ..views[0].panel(title, y_name)
+    };
+    let mut preload = panel("Preload", "preload, N", &|row| row.controller.preload_n);
+    preload.levels = views[0].limit_n.iter().map(|&n| ("limit", Look::Limit, n)).collect();
+    let speed = panel("Speed", "speed, mm/s", &|row| {
+        row.known(|t| t.speed_true_mm_s, |c| c.wheel_speed_mm_s)
+    });
+    let position = panel("Position on the sleeve", "position, mm", &Tick::position_mm);
+    let mut slip = panel("Gross slip of the wheel", "slip, mm", &|row| row.of_truth(|t| t.slip_mm));
+    slip.least_span = 2.0;
+    let mut gap = views[0].gap();
+    gap.title = "Gap at the steps".to_owned();
+    let all = [preload, speed, position, slip, own_gaps(&views, runs, Panel { x, ..gap })];
+    all.into_iter().filter(Panel::has_data).collect()
+}
+
+/// The gap of every crossing, beside the reference of the first run.
+fn own_gaps(views: &[View; 2], runs: [(&str, &Recording); 2], mut panel: Panel) -> Panel {
+    let one = panel.also.map_or(1.0, |also| also.0);
+    let own = |line: &CrossingLine| {
+        let gap = Some(line.gap_mm).filter(|gap| gap.is_finite());
+        Some((line.lift_s, gap.or(line.gap_measured_mm)? / one))
+    };
+    let all = views.iter().zip(runs).zip(COLOURS);
+    panel.marks = all
+        .map(|((view, (name, _)), colour)| {
+            let points = view.recording.summary.crossings.iter().filter_map(own).collect();
+            Marks { name: name.to_owned().into(), shape: Shape::Dot, colour, points }
+        })
+        .collect();
+    (panel.lines, panel.shades, panel.rules) = Default::default();
+    let gaps = panel.marks.iter().flat_map(|marks| &marks.points).map(|point| point.1);
+    let range = axis::extent(gaps.chain(panel.levels.iter().map(|level| level.2)));
+    panel.y = range.map(|range| axis::padded((range.0 - 0.5, range.1 + 0.5), 0.1));
+    panel
 }
 
 #[cfg(test)]
@@ -167,5 +235,16 @@ mod tests {
         let page = compare_html(("one.mcap", &a), ("two.mcap", &b));
         let row = "<tr><td>preload.limit_n</td><td>50</td><td>48.5</td></tr>";
         assert_eq!(page.matches(row).count(), 1, "{page}");
+    }
+
+    #[test]
+    fn both_runs_are_in_every_plot() {
+        let (a, b) = (example::deploy(), example::faulted());
+        let svg = beside_svg([("scheduled preload", &a), ("constant preload", &b)]);
+        for name in ["scheduled preload", "constant preload"] {
+            // A line in four plots; the marks, with their rims, in one; five legends.
+            assert_eq!(svg.matches(name).count(), 4 + 2 + 5, "{name}");
+        }
+        assert!(svg.contains("reference gap") && !svg.contains("NaN"));
     }
 }

@@ -8,8 +8,8 @@ use std::borrow::Cow;
 use plotters::style::RGBColor;
 
 use super::axis;
+use super::axis::TEXT_PX;
 use super::decimate::decimate;
-use super::mesh::TEXT_PX;
 use super::palette;
 use super::svg::{escape, hex, width};
 use legend::Sample;

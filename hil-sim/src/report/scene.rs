@@ -15,18 +15,22 @@ const ROWS: (usize, usize) = (2500, 1500);
 /// Surroundings of a crossing: before the first touch and after lift-off, s.
 pub(super) const AROUND_S: (f64, f64) = (0.5, 0.8);
 
-/// Names of the columns of [`Scene::rows`], with their decimals. `NaN` becomes null.
-pub(super) const COLUMNS: [(&str, i32); 10] = [
-    ("t_s", 3),
-    ("position_mm", 3),
-    ("radius_mm", 3),
-    ("compression_mm", 3),
-    ("preload_n", 2),
-    ("preload_ref_n", 2),
-    ("corner_force_n", 2),
-    ("floor_force_n", 2),
-    ("root_clearance_mm", 3),
-    ("speed_mm_s", 2),
+/// A column of [`Scene::rows`]: name, decimals, value. `NaN` becomes null.
+type Column = (&'static str, i32, fn(&Geometry, &Tick) -> f64);
+
+pub(super) const COLUMNS: [Column; 10] = [
+    ("t_s", 3, |_, row| row.controller.t_s),
+    ("position_mm", 3, |_, row| row.position_mm()),
+    ("radius_mm", 3, |_, row| row.known(|t| t.radius_true_mm, |c| c.radius_mm)),
+    ("compression_mm", 3, |_, row| row.compression_mm()),
+    ("preload_n", 2, |_, row| row.known(|t| t.preload_true_n, |c| c.preload_n)),
+    ("preload_ref_n", 2, |_, row| row.controller.preload_ref_n),
+    ("corner_force_n", 2, |_, row| row.of_truth(|t| t.corner_force_n)),
+    ("floor_force_n", 2, |_, row| row.of_truth(|t| t.floor_force_n)),
+    ("root_clearance_mm", 3, |geometry, row| {
+        row.known(|t| t.root_clearance_mm, |c| geometry.clearance_mm(c.position_mm, c.radius_mm))
+    }),
+    ("speed_mm_s", 2, |_, row| row.known(|t| t.speed_true_mm_s, |c| c.wheel_speed_mm_s)),
 ];
 
 /// A run as the script draws it.
@@ -181,7 +185,7 @@ impl Scene {
 
 fn event(geometry: &Geometry, rows: &[&Tick], line: &CrossingLine) -> Event {
     let at = rows.partition_point(|row| row.controller.t_s < line.touch_s).min(rows.len() - 1);
-    let compression_mm = compression_mm(rows[at]);
+    let compression_mm = rows[at].compression_mm();
     let gap_mm = if line.gap_mm.is_finite() { Some(line.gap_mm) } else { line.gap_measured_mm };
     let gap_mm = gap_mm.unwrap_or(f64::NAN);
     let step_mm = geometry.step_mm(line.step_mm);
@@ -199,43 +203,12 @@ fn event(geometry: &Geometry, rows: &[&Tick], line: &CrossingLine) -> Event {
     }
 }
 
-fn compression_mm(row: &Tick) -> f64 {
-    row.truth.map_or(row.controller.compression_mm, |truth| truth.compression_true_mm)
-}
-
 /// The values of [`COLUMNS`].
 fn values(geometry: &Geometry, row: &Tick) -> [f64; COLUMNS.len()] {
-    let c = &row.controller;
-    let values = match &row.truth {
-        Some(t) => [
-            c.t_s,
-            t.position_true_mm,
-            t.radius_true_mm,
-            t.compression_true_mm,
-            t.preload_true_n,
-            c.preload_ref_n,
-            t.corner_force_n,
-            t.floor_force_n,
-            t.root_clearance_mm,
-            t.speed_true_mm_s,
-        ],
-        None => [
-            c.t_s,
-            c.position_mm,
-            c.radius_mm,
-            c.compression_mm,
-            c.preload_n,
-            c.preload_ref_n,
-            f64::NAN,
-            f64::NAN,
-            geometry.clearance_mm(c.position_mm, c.radius_mm),
-            c.wheel_speed_mm_s,
-        ],
-    };
-    std::array::from_fn(|place| {
-        let scale = 10_f64.powi(COLUMNS[place].1);
+    COLUMNS.map(|(_, decimals, of)| {
+        let scale = 10_f64.powi(decimals);
         // Plus zero: what rounds to zero has no sign.
-        (values[place] * scale).round() / scale + 0.0
+        (of(geometry, row) * scale).round() / scale + 0.0
     })
 }
 

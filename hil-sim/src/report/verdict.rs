@@ -62,20 +62,12 @@ fn slips(summary: &Summary) -> bool {
 impl Grade {
     /// Its name in the style of a page.
     pub(crate) const fn name(self) -> &'static str {
-        match self {
-            Self::Good => "good",
-            Self::Fair => "fair",
-            Self::Bad => "bad",
-        }
+        ["good", "fair", "bad"][self as usize]
     }
 
     /// Its colour on a terminal: green, amber, red.
     pub(crate) const fn ansi(self) -> u8 {
-        match self {
-            Self::Good => 32,
-            Self::Fair => 33,
-            Self::Bad => 31,
-        }
+        [32, 33, 31][self as usize]
     }
 
     /// Grade of a run.

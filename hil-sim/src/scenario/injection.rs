@@ -1,12 +1,10 @@
 //! One fault of a scenario: target, kind, onset, duration, magnitude.
 
 mod catalogue;
-mod kinds;
 
 use serde::{Deserialize, Serialize};
 
 pub use catalogue::{CATALOGUE, Entry, HARDWARE, entry};
-pub use kinds::{Kind, Target};
 
 /// When a fault begins.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -96,5 +94,213 @@ impl std::fmt::Display for Injection {
             Some(s) => write!(f, " for {s} s"),
             None => Ok(()),
         }
+    }
+}
+
+/// What breaks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Target {
+    /// Wheel encoder.
+    Encoder,
+    PreloadSensor,
+    CompressionSensor,
+    /// Arm angle sensor.
+    Angle,
+    /// Converter that reads the outputs of both bridges.
+    Readback,
+    /// Readback of the drive's bridge.
+    DriveReadback,
+    /// Readback of the pre-tightener's bridge.
+    PretightenerReadback,
+    /// Drive motor or its bridge.
+    Drive,
+    /// Pre-tightener's motor or its bridge.
+    Pretightener,
+    /// Grip of the wheel.
+    Wheel,
+    /// Rubber of the wheel.
+    Tread,
+    /// Spring of the pre-tightener.
+    Spring,
+    /// Top load.
+    Load,
+    /// Control tick.
+    Tick,
+    Model,
+    /// Reader of the log.
+    Log,
+    /// Source of the commands.
+    Commands,
+    /// The controller, which starts again.
+    Reset,
+    PreloadSensorConverter,
+    /// Converter of the compression sensor.
+    TreadConverter,
+    AngleBus,
+    /// Line A of the wheel encoder.
+    EncoderLineA,
+    /// Line B of the wheel encoder.
+    EncoderLineB,
+    /// Direct memory access.
+    Dma,
+    /// Timer that wakes the tasks.
+    Timer,
+    /// The button's interrupt line.
+    Interrupt,
+    /// The code that the processor executes.
+    Processor,
+    WheelEncoderTask,
+    PreloadSensorTask,
+    CompressionSensorTask,
+    ArmAngleTask,
+    /// Task of the control tick.
+    TickTask,
+    ModelTask,
+    JournalTask,
+    LineTask,
+    Supply,
+    ResetPin,
+    Debugger,
+    HostLine,
+    /// The set of parameters in force, in flash.
+    StoredSet,
+    /// The one before it, in the other place in flash.
+    SpareSet,
+    /// The set that the image carries, with nothing stored.
+    ImageSet,
+    /// A new set while it is written to flash.
+    ParameterSave,
+    /// The image in flash, after its first start.
+    Image,
+    /// Magnet of the arm angle sensor.
+    Magnet,
+    /// Wire of the emergency stop.
+    StopWire,
+    OptionBytes,
+}
+
+/// How it breaks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Kind {
+    /// Gives nothing.
+    Off,
+    /// Keeps its last value.
+    Stuck,
+    /// Gives random codes.
+    Garbage,
+    /// Multiplies its value.
+    Gain,
+    /// Adds a constant.
+    Offset,
+    /// Follows slowly.
+    Slow,
+    /// Follows late.
+    Delayed,
+    /// Fails for a part of every 100 ms.
+    Intermittent,
+    /// Does not move.
+    Stalled,
+    /// Keeps a part of its force.
+    Weak,
+    /// Moves in the wrong direction.
+    Reversed,
+    /// Moves at full duty whenever its bridge is on.
+    Runaway,
+    /// Loses friction.
+    Slip,
+    /// A sector is soft; a save is cut by a loss of power.
+    Torn,
+    Broken,
+    Doubled,
+    /// Is late, so that ticks are lost.
+    Overrun,
+    /// Does not answer.
+    Hung,
+    /// Is absent.
+    Gone,
+    /// Occurs in every tick.
+    Flooding,
+    /// Occurs at random.
+    Random,
+    /// Flips bits.
+    BitErrors,
+    Reset,
+    /// Starts again with its record.
+    Recorded,
+    /// Regulates its current.
+    Regulating,
+    /// Misses a clock edge.
+    Disturbed,
+    /// Has one wrong bit, which is corrected.
+    OneWrongBit,
+    /// Has two wrong bits, which are reported.
+    TwoWrongBits,
+    Halted,
+    Shorted,
+}
+
+/// The name of a word of the scenario.
+fn word(value: impl Serialize) -> String {
+    match serde_json::to_value(value) {
+        Ok(serde_json::Value::String(name)) => name,
+        _ => String::new(),
+    }
+}
+
+impl Target {
+    pub fn name(self) -> String {
+        word(self)
+    }
+
+    /// Whether it is one of the four sensors or the readback of a bridge.
+    pub(crate) const fn is_sensor(self) -> bool {
+        use Target::{Angle, CompressionSensor, Encoder, PreloadSensor};
+        self.is_readback() || matches!(self, Encoder | PreloadSensor | CompressionSensor | Angle)
+    }
+
+    /// Whether it is the readback of a bridge or of both.
+    pub(crate) const fn is_readback(self) -> bool {
+        matches!(self, Self::Readback | Self::DriveReadback | Self::PretightenerReadback)
+    }
+
+    /// Whether such a fault of it resets the board, at once or by the watchdog.
+    pub const fn resets_board(self, kind: Kind) -> bool {
+        match self {
+            Self::ResetPin | Self::Processor => true,
+            Self::Debugger => matches!(kind, Kind::Reset),
+            Self::Supply => !matches!(kind, Kind::Weak),
+            _ => false,
+        }
+    }
+
+    /// Whether it is a set of parameters that is read at a start.
+    pub const fn is_of_sets(self) -> bool {
+        matches!(self, Self::StoredSet | Self::SpareSet | Self::ImageSet | Self::ParameterSave)
+    }
+
+    /// Whether it is memory that is read at a start.
+    pub const fn is_of_start(self) -> bool {
+        self.is_of_sets() || matches!(self, Self::OptionBytes)
+    }
+
+    /// Whether a fault of it changes forces or motion of the plant directly.
+    pub const fn moves(self) -> bool {
+        use Target::{Drive, Load, Pretightener, Spring, Tread, Wheel};
+        matches!(self, Drive | Pretightener | Wheel | Tread | Spring | Load)
+    }
+}
+
+impl Kind {
+    /// Whether a fault of an actuator lies in its bridge or before it, so that the bridge
+    /// puts out another duty than it was given. The others lie behind: in motor and gear.
+    pub(crate) const fn is_in_bridge(self) -> bool {
+        use Kind::{Delayed, Off, Regulating, Reversed, Runaway, Stuck};
+        matches!(self, Off | Stuck | Reversed | Delayed | Runaway | Regulating)
+    }
+
+    pub fn name(self) -> String {
+        word(self)
     }
 }

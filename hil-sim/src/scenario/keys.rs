@@ -7,7 +7,7 @@ use toml::{Table, Value};
 
 use super::run::{ControllerKind, Direction, MismatchDraw, RunOptions};
 use crate::plant::mismatch::Mismatch;
-use crate::plant::section::{Field, Section};
+use crate::plant::spread::{Field, Section};
 use crate::plant::spread::{Noise, Spread};
 
 /// Names of the presets.
@@ -304,6 +304,11 @@ mod tests {
             ("tread.thickness_mm", "mismatch.tread_thickness_mm"),
             ("plant.mass_kg", "plant.moved_mass_kg"),
             ("limit", "preload.limit_n"),
+            ("friction", "mismatch.friction"),
+            ("plant.tread_thickness_mm", "mismatch.tread_thickness_mm"),
+            ("preload.limit", "preload.limit_n"),
+            ("cruise_speed", "drive.cruise_speed_mm_s"),
+            ("control.cruise_speed_mm_s", "drive.cruise_speed_mm_s"),
         ] {
             assert_eq!(nearest(key, &known), Some(wanted), "{key}");
         }

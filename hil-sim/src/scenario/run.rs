@@ -139,9 +139,7 @@ impl StepAnomaly {
             Self::Extra { .. } => &[204],
         }
     }
-}
 
-impl StepAnomaly {
     /// Names as written in scenarios.
     pub(super) const NAMES: [&'static str; 5] = ["early", "late", "missing", "higher", "extra"];
 

@@ -142,30 +142,38 @@ fn a_value_out_of_range_is_named_with_its_range() {
         ("plant.mu=12", "plant.mu = 12: expected a value from 0 to 3"),
         ("preload.limit_n=2", "preload.limit_n = 2: expected a value from 5 to 180"),
     ]);
-    refused_files(&[(
-        "[spread]\nk_inf_rel = 4.0\n",
-        "spread.k_inf_rel = 4: expected a value from 0 to 0.3",
-    )]);
+    let room = "preload.limit_n = 30: expected at least 34.9, as preload.cruise_n = 33.3";
+    let below = "preload.cruise_n = 60: expected at most 47.8, as preload.limit_n = 50";
+    refused_files(&[
+        ("[spread]\nk_inf_rel = 4.0\n", "spread.k_inf_rel = 4: expected a value from 0 to 0.3"),
+        ("[preload]\nlimit_n = 30\n", room),
+        ("[preload]\ncruise_n = 60\n", below),
+    ]);
 }
 
 #[test]
-fn a_preload_limit_without_room_above_the_cruise_preload_is_refused() {
-    for (text, message) in [
-        (
-            "limit_n = 30",
-            "preload.limit_n = 30: expected at least 34.9, as preload.cruise_n = 33.3",
-        ),
-        ("cruise_n = 60", "preload.cruise_n = 60: expected at most 47.8, as preload.limit_n = 50"),
+fn an_error_names_the_key_that_was_set_and_the_bound_that_it_broke() {
+    for (set, parts) in [
+        ("preload.cruise_n=60", &[" = 60", "at most 47.", "preload.limit_n = 50"][..]),
+        ("preload.limit_n=20", &[" = 20", "at least 34.", "preload.cruise_n = 33.3"]),
+        ("drive.cruise_speed_mm_s=90", &[" = 90", "at most"]),
+        ("drive.cruise_speed_mm_s=4", &[" = 4", "at least 5"]),
+        ("control.safe_speed_mm_s=60", &[" = 60", "at most"]),
+        ("rig.step_positions_mm=18,40,95", &["step 3 is at 95 mm", "at most 80"]),
+        ("rig.step_positions_mm=18,62,40", &["step 3 ", " at 40 mm"]),
+        ("rig.step_positions_mm=18,20,62", &["step 2 is at 20 mm", "at least"]),
+        ("rig.travel_mm=50", &[" = 50", "at least 62"]),
+        ("rig.wheel_radius_mm=120", &[" = 120"]),
+        ("rig.wall_radius_mm=400", &[" = 400"]),
     ] {
-        refused_files(&[(&format!("[preload]\n{text}\n"), message)]);
+        let said = set_error(set);
+        let key = set.split('=').next().unwrap();
+        assert!(said.starts_with(&format!("command line: {key}")), "{said}");
+        assert!(
+            said.lines().count() == 1 && parts.iter().all(|part| said.contains(part)),
+            "{said}"
+        );
     }
-}
-
-#[test]
-fn a_step_table_out_of_order_is_refused() {
-    let said = error("[rig]\nstep_positions_mm = [18, 62, 40]\n");
-    assert!(said.starts_with("bench.toml: rig.step_positions_mm: step 3 "), "{said}");
-    assert!(said.contains(" at 40 mm"), "{said}");
 }
 
 #[test]
@@ -247,8 +255,16 @@ fn faults_are_read_and_written_back() {
 
 #[test]
 fn every_mistake_of_a_fault_is_named() {
+    let near = "target = \"preload_sensor\": no such target, did you mean \"preload-sensor\"?";
     for (target, kind, rest, message) in [
         ("angel", "off", "at_s = 1", "target = \"angel\": no such target, did you mean \"angle\"?"),
+        ("preload_sensor", "stuck", "at_s = 2", near),
+        (
+            "preload-sensor",
+            "stock",
+            "at_s = 2",
+            "kind = \"stock\": no such kind, did you mean \"stuck\"?",
+        ),
         ("model", "off", "at_s = 1", "kind = \"off\": expected \"hung\""),
         ("model", "hung", "", "at_s = nothing: expected one of at_s, at_mm and at_crossing"),
         ("model", "hung", "at_s = 1\nat_mm = 2", "at_s = at_s and at_mm: expected one of"),

@@ -5,7 +5,7 @@ use interstage::rig::{Bound, RigError};
 use super::injection::entry;
 use super::merge::Provenance;
 use super::{Scenario, ScenarioError, StepAnomaly, keys};
-use crate::plant::section::{Field, Section};
+use crate::plant::spread::{Field, Section};
 
 /// Largest offset of an early or late step, mm.
 const MAX_OFFSET_MM: f64 = 20.0;

@@ -3,10 +3,11 @@
 //! Every case is possible: preload, load and spring press no more than the tread carries under
 //! the corner of its step. Impossible cases are drawn separately: they must be refused.
 
+use interstage::rig::Rig;
 use serde::Serialize;
 
 use crate::plant::draw::ELEMENTS;
-use crate::plant::limits::{DEEPEST, HIGHEST, leans, takes};
+use crate::plant::limits::{DEEPEST, DIGS, HIGHEST, SINKS, TOWERS, leans, takes};
 use crate::plant::ring::RingParameters;
 
 /// Radius and width of the wheel, mm.
@@ -132,16 +133,8 @@ impl StressCase {
     /// Wheel and rubber.
     pub(super) fn ring(&self) -> RingParameters {
         let k_inf = self.k_inf_pa_per_m * 1e-9;
-        RingParameters {
-            radius_mm: RADIUS_MM,
-            width_mm: WIDTH_MM,
-            k_inf,
-            k_0: k_inf * self.stiffening,
-            tau_s: self.tau_s,
-            elements: ELEMENTS,
-            tread_thickness_mm: 0.0,
-            second_relaxation: 1.0,
-        }
+        let (k_0, tau_s) = (k_inf * self.stiffening, self.tau_s);
+        RingParameters { k_inf, k_0, tau_s, ..RingParameters::of(&Rig::prototype(), ELEMENTS) }
     }
 
     /// Speed of the unloaded motor, mm/s.
@@ -193,18 +186,18 @@ pub(super) fn beyond(count: usize, seed: u64) -> Vec<(StressCase, &'static str)>
             let case = StressCase { mu, step_mm: case.step_mm.max(2.0), load_n: 0.0, ..case };
             let most = takes(&case.ring(), case.step_mm);
             let mass_kg = 2.1e3 * most / case.no_load_mm_s().powi(2);
-            return (StressCase { mass_kg, ..case }, "braked wheel digs itself in");
+            return (StressCase { mass_kg, ..case }, DIGS);
         }
         let most = carries(case.k_inf_pa_per_m, case.step_mm);
         // Where a deep corner is refused before a high one.
         let deep = (DEEPEST * RADIUS_MM / deepest(case.step_mm)).powi(2);
         let sinks = case.phase < 0.5;
         let (name, force_n) = if sinks {
-            ("preload sinks the wheel", 1.05 * deep * most)
+            (SINKS, 1.05 * deep * most)
         } else if deep > 1.1 {
-            ("corner as high as the hub", (1.0 + 0.5 * (deep - 1.0)) * most)
+            (TOWERS, (1.0 + 0.5 * (deep - 1.0)) * most)
         } else {
-            ("preload sinks the wheel", 2.0 * most)
+            (SINKS, 2.0 * most)
         };
         let case = StressCase { preload_n: force_n, load_n: 0.0, spring_n_per_mm: 1e-6, ..case };
         (case, name)

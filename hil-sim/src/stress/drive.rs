@@ -1,10 +1,13 @@
-//! A case on the complete rig: motor, arm, screw, friction and ring, along its course over
-//! the step, with its energies accounted for.
+//! A case on the complete rig: motor, arm, screw, friction and ring, along its course over the
+//! step, with its energies accounted for. And on the ring alone: pushed, frictionless; energy that
+//! wall and wheel put into the tread may be lost, never gained.
 
 use super::cases::{Course, RADIUS_MM, StressCase};
 use crate::plant::actuators::DriveMotor;
+use crate::plant::balance::{Axial, Balance, BalanceError};
 use crate::plant::draw::{ELEMENTS, PlantParameters};
 use crate::plant::rig::{Drives, PlantError, Truth, VirtualRig};
+use crate::plant::ring::{Motion, Ring};
 use crate::plant::wall::{Step, Wall};
 use crate::scenario::Scenario;
 
@@ -132,4 +135,79 @@ fn mechanical(plant: &PlantParameters, truth: &Truth, seat_n: f64) -> f64 {
     let kinetic =
         plant.mass_kg * truth.speed_mm_s.powi(2) + plant.drive.mass_kg * truth.tread_mm_s.powi(2);
     0.5e-3 * kinetic + plant.load_n * truth.position_mm + 0.5 * pressed * pressed / spring
+}
+
+/// Stride, mm, and the most strides in a step of time: those of the plant.
+const STRIDE_MM: f64 = 0.02;
+const MOST_STRIDES: f64 = 256.0;
+
+/// Ring steps of a run.
+const ROLL_BUDGET: usize = 1000;
+
+/// Figures of a run.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Roll {
+    /// Largest depth of the tread, mm.
+    pub depth_mm: f64,
+    /// Energy taken out of the tread beyond what it was given, mJ.
+    pub created_mj: f64,
+    /// What the ring's resolution can account for, mJ.
+    pub resolved_mj: f64,
+}
+
+/// Rolls `case`.
+pub(super) fn roll(case: &StressCase) -> Result<Roll, BalanceError> {
+    let per_tick = case.speed_mm_s * case.dt_s;
+    let parts = (per_tick / STRIDE_MM).ceil().clamp(1.0, MOST_STRIDES);
+    let (dt_s, stride) = (case.dt_s / parts, per_tick / parts);
+    let reach = case.reach_mm();
+    let longest = 2.0 * reach + RADIUS_MM;
+    let steps = if stride > 0.0 {
+        (longest / stride).ceil().min(ROLL_BUDGET as f64) as usize
+    } else {
+        ROLL_BUDGET / 4
+    };
+    // A run too short for the complete step begins somewhere on the step.
+    let travel = stride * steps as f64;
+    let lead = (travel * 0.4).min(0.5 * RADIUS_MM);
+    let sense = case.course.speed(0.0);
+    let first = if sense > 0.0 { -reach - lead } else { lead };
+    let mut x = first + sense * case.phase * (longest - travel).max(0.0);
+    let wall = Wall::new(vec![Step { position_mm: 0.0, height_mm: case.step_mm }]);
+    let mut ring = Ring::new(case.ring());
+    let balance = Balance::under(case.preload_n, Axial::Pushed);
+    let mut y = RADIUS_MM + wall.local(x).base_mm;
+    let mut out = Roll::default();
+    let (mut given, mut stored, mut lift) = (0.0f64, 0.0, 0.0);
+    let mut forces = (0.0, 0.0);
+    for index in 0..steps {
+        let dx = stride * case.course.speed(index as f64 / steps as f64);
+        x += dx;
+        let local = wall.local(x);
+        let height_mm = y - local.base_mm;
+        let motion = Motion { wall: local, height_mm, turn_rad: dx / RADIUS_MM, dt_s };
+        let solved = balance.solve(&mut ring, motion)?;
+        ring.commit(&Motion { height_mm: solved.height_mm, ..motion });
+        let height = solved.height_mm + local.base_mm;
+        let contact = solved.contact;
+        let now = (contact.sine_n, contact.cosine_n);
+        if index == 0 {
+            // Put down onto wall or corner: no more than this can come back.
+            stored = case.preload_n * contact.depth_mm.max(0.0);
+        } else {
+            let dy = height - y;
+            given += 0.5 * ((forces.0 + now.0) * dx - (forces.1 + now.1) * dy);
+            lift += dy.abs();
+        }
+        (y, forces) = (height, now);
+        // Written so that a value that is not finite shows.
+        out.created_mj =
+            if given.is_nan() { f64::NAN } else { out.created_mj.max(-given - stored) };
+        out.depth_mm = if y.is_nan() { f64::NAN } else { out.depth_mm.max(contact.depth_mm) };
+    }
+    // A corner between two elements touches neither: heights are known to the distance of the
+    // elements, work to that and the trapezoids of a stride.
+    let grain = std::f64::consts::TAU * RADIUS_MM / ELEMENTS as f64 + stride;
+    out.resolved_mj = case.preload_n * (grain + 0.01 * lift);
+    Ok(out)
 }

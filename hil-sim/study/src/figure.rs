@@ -1,6 +1,8 @@
 //! A figure as data: what is drawn, what is printed as JSON, and what the study's claims
 //! are judged by.
 
+use std::borrow::Cow;
+
 use serde::Serialize;
 
 /// Where the values of a series come from.
@@ -212,7 +214,7 @@ pub struct Claim {
     /// Where the study makes it.
     pub section: &'static str,
     /// What it says.
-    pub claim: &'static str,
+    pub claim: Cow<'static, str>,
     /// Whether it holds in ours.
     pub holds: bool,
     /// Whether a parameter of ours is fitted to just this, so that holding proves nothing.
@@ -233,8 +235,8 @@ impl Claim {
 
     /// A claim of `figure`, made in `section`, not yet judged.
     pub fn of(figure: &'static str, section: &'static str, id: &'static str) -> Self {
-        let (claim, holds, fitted, why) = ("", false, false, String::new());
-        Self { id, figure, section, claim, holds, fitted, why }
+        let (claim, why) = ("".into(), String::new());
+        Self { id, figure, section, claim, holds: false, fitted: false, why }
     }
 
     /// The same, with a parameter of ours fitted to it.
@@ -242,10 +244,20 @@ impl Claim {
         Self { fitted: true, ..self }
     }
 
-    /// What the claim says, whether it holds, what was found, and the reason if it does
-    /// not hold.
-    pub fn judged(self, claim: &'static str, holds: bool, found: String, but: &str) -> Self {
-        let why = if holds || but.is_empty() { found } else { format!("{found} {but}") };
-        Self { claim, holds, why, ..self }
+    /// What the claim says, whether it holds, and what was found.
+    pub fn judged(self, claim: impl Into<Cow<'static, str>>, holds: bool, why: String) -> Self {
+        Self { claim: claim.into(), holds, why, ..self }
+    }
+
+    /// The same with the reason if it does not hold; empty for none.
+    pub fn explained(
+        self,
+        claim: impl Into<Cow<'static, str>>,
+        holds: bool,
+        found: String,
+        reason: &str,
+    ) -> Self {
+        let why = if holds || reason.is_empty() { found } else { format!("{found} {reason}") };
+        self.judged(claim, holds, why)
     }
 }

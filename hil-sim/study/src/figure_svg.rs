@@ -7,8 +7,8 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, VPos};
 
 use crate::figure::{Figure, Panel, Series, Source};
-use hil_sim::report::axis::{Scale, extent, label, padded, ticks};
-use hil_sim::report::mesh::{self, TEXT_PX};
+
+use hil_sim::report::axis::{self, Scale, TEXT_PX, extent, label, padded, ticks};
 use hil_sim::report::palette;
 use hil_sim::report::svg::{Area, Drawn, SCALE, fixed, font, text_width};
 
@@ -188,7 +188,7 @@ fn draw_scaled(panel: &Panel, cell: &Area) -> Drawn {
         .x_label_area_size(38 * S)
         .y_label_area_size(widest.unwrap_or(0) + 26 * S)
         .build_cartesian_2d(Scale::new(x, x_ticks), Scale::new(y, y_ticks))?;
-    mesh::plain(&mut chart.configure_mesh())
+    axis::plain(&mut chart.configure_mesh())
         .x_label_formatter(&|x| match panel.categories.get(x.round() as usize) {
             Some(name) => name.clone(),
             None if panel.categories.is_empty() => shown(*x, x_decimals),

@@ -12,7 +12,7 @@ use crate::reference::rubber::{Rubber, THICKNESS_MM};
 use crate::reference::vibration::{Arm, CONSTRAINED_HZ, FREE_HZ, bending};
 use crate::reference::{ReferenceCase, Resolution, collision, impact};
 use hil_sim::plant::balance::BalanceError;
-use hil_sim::plant::crossing::{CrossingCase, CrossingResult, cross};
+use hil_sim::plant::crossing::CrossingResult;
 
 /// Place of the centre from the edge, mm, from which on single elements shake the ring.
 const EDGE_MM: f64 = -0.2;
@@ -85,18 +85,6 @@ fn case(speed_mm_s: f64, preload_n: f64) -> ReferenceCase {
     }
 }
 
-/// The same without inertia.
-fn still(case: &ReferenceCase) -> Result<CrossingResult, BalanceError> {
-    cross(&CrossingCase {
-        ring: case.ring(),
-        step_height_mm: case.rig.rig.step_height_mm,
-        speed_mm_s: case.speed_mm_s,
-        preload_n: case.preload_n,
-        axial: case.axial,
-        stride_mm: case.resolution.stride_mm,
-    })
-}
-
 pub fn compute() -> Result<ModelFigures> {
     let computed: Vec<(CaseFigures, f64)> =
         (0..3).into_par_iter().map(of_case).collect::<Result<_>>()?;
@@ -123,7 +111,7 @@ pub fn compute() -> Result<ModelFigures> {
 fn of_case(index: usize) -> Result<(CaseFigures, f64)> {
     let (speed_mm_s, preload_n) = CASES[index];
     let case = case(speed_mm_s, preload_n);
-    let still = still(&case)?;
+    let still = case.still()?;
     let moving = collision::dynamic(&case)?;
     let climbing = moving.samples.iter().filter(|sample| sample.x_mm < EDGE_MM);
     let climbing_s = climbing.clone().map(|sample| sample.t_s).fold(f64::NEG_INFINITY, f64::max);
@@ -173,7 +161,7 @@ pub fn figure() -> Result<Figure> {
             .into_par_iter()
             .map(|index| {
                 let preload = 80.0 + 6.0 * f64::from(index);
-                Ok((preload, still(&case(speed, preload))?))
+                Ok((preload, case(speed, preload).still()?))
             })
             .collect::<Result<_, BalanceError>>()?;
         let series = |of: fn(&CrossingResult) -> f64| {

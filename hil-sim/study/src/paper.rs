@@ -13,7 +13,6 @@ pub mod cases;
 pub mod experiment;
 mod finite_elements;
 pub mod histories;
-pub mod history;
 pub mod hold;
 pub mod means;
 pub mod measure;

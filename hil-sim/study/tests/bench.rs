@@ -5,7 +5,6 @@ use std::process::{Command, Output};
 use hil_sim::plant::balance::Axial;
 use hil_sim::plant::crossing::{CrossingCase, cross};
 use hil_sim::plant::precision::{FINER, Setting, work_precision};
-use hil_sim::plant::ring::RingParameters;
 use interstage::rig::Rig;
 use rig_study::bench::peers::Peers;
 use rig_study::bench::{cycles, rollout};
@@ -56,15 +55,8 @@ fn a_rollout_answers_on_the_core_as_on_the_host() {
 #[test]
 fn an_independent_solver_gives_the_rings_crossing() {
     let (rig, mesh) = (Rig::fe(), Setting::usual().finer(FINER));
-    let found = cross(&CrossingCase {
-        ring: RingParameters::of(&rig, mesh.elements),
-        step_height_mm: rig.rig.step_height_mm,
-        speed_mm_s: 5.0,
-        preload_n: 100.0,
-        axial: Axial::Pushed,
-        stride_mm: mesh.stride_mm,
-    })
-    .unwrap();
+    let of = (5.0, 100.0, Axial::Pushed);
+    let found = cross(&CrossingCase::of(&rig, mesh.both(), of)).unwrap();
     let settings = Peers::stored().unwrap().settings;
     let solved =
         settings.iter().filter_map(|s| s.tolerance.and(Some((s.gap_mm?, s.corner_force_n))));

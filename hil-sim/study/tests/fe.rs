@@ -4,6 +4,7 @@
 use hil_sim::plant::balance::Axial;
 use hil_sim::plant::crossing::{CrossingCase, cross};
 use hil_sim::plant::ring::RingParameters;
+use interstage::rig::Rig;
 use serde_json::Value;
 
 fn results() -> Value {
@@ -16,16 +17,8 @@ fn number(row: &Value, name: &str) -> f64 {
 
 /// The rubber of the reference; `stiffening` 1 is static.
 fn rubber(stiffening: f64, elements: usize) -> RingParameters {
-    RingParameters {
-        radius_mm: 25.0,
-        width_mm: 28.0,
-        k_inf: 0.6044,
-        k_0: 0.6044 * stiffening,
-        tau_s: 0.1059,
-        elements,
-        tread_thickness_mm: 0.0,
-        second_relaxation: 1.0,
-    }
+    let ring = RingParameters::of(&Rig::fe(), elements);
+    RingParameters { k_0: stiffening * ring.k_inf, ..ring }
 }
 
 /// Gap of the plant's ring on a finely resolved crossing, mm; `stiffening` 1 is static.

@@ -91,7 +91,7 @@ fn the_order_is_that_of_the_differences() {
 /// mJ, pushed at constant speed.
 fn climb(ring: RingParameters, speed: f64, preload_n: f64, stride: f64) -> Option<(f64, f64)> {
     let wall = Wall::new(vec![Step { position_mm: 0.0, height_mm: 4.0 }]);
-    let balance = Balance { preload_n, spring_n_per_mm: 0.0, arm_n: 0.0, axial: Axial::Pushed };
+    let balance = Balance::under(preload_n, Axial::Pushed);
     let from = if speed > 0.0 { FROM_MM.0 } else { FROM_MM.1 };
     let strides = ((PLACE_MM - from).abs() / stride).round();
     let dx = (PLACE_MM - from) / strides;

@@ -130,13 +130,6 @@ fn the_envelope_writes_its_picture_and_every_key() {
     assert!(std::fs::read_to_string(picture).unwrap().contains("scheduled, known"));
 }
 
-#[test]
-fn a_grid_that_is_none_is_refused() {
-    for text in ["8", "1x7", "a x b"] {
-        refused(&["envelope", "-n", text], &["-n", text, "8x7"]);
-    }
-}
-
 /// Runs both halves of a campaign into files, and what one machine prints of it.
 fn halves(at: &Path, command: &[&str]) -> [Output; 2] {
     let parts = ["1/2", "2/2"].map(|shard| {
@@ -199,19 +192,6 @@ fn parts_that_do_not_fit_are_refused_and_a_missing_one_is_told() {
     assert!(stdout(&output).starts_with("Partial: 2 of 3 cases"), "{}", stdout(&output));
     let output = rig_in(at, &["merge", "a", "b", "--json"]);
     assert_eq!(object(&output)["partial"], serde_json::json!({ "done": 2, "of": 3 }));
-}
-
-#[test]
-fn a_part_without_a_case_and_seeds_beyond_the_last_are_refused() {
-    refused(&["montecarlo", "-n", "1", "--shard", "2/2"], &["--shard 2/2", "of 1"]);
-    refused(&["faults", "--clean", "1", "--shard", "2/2"], &["--shard 2/2"]);
-    refused(&["faults", "--only", "tick overrun", "-n", "1", "--shard", "2/2"], &["--shard 2/2"]);
-    let last = "9223372036854775807";
-    for verb in [&["montecarlo", "-n", "2"][..], &["compare", "-n", "2"]] {
-        refused(&[verb, &["--seed", last]].concat(), &["run.seed", "9223372036854775805"]);
-    }
-    let faults = ["faults", "-n", "2", "--set", "run.seed=9223372036854775806"];
-    refused(&faults, &["run.seed", "9223372036854775805"]);
 }
 
 #[test]

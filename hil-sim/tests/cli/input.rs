@@ -6,7 +6,7 @@ use super::{refused, refused_in};
 fn parameters_are_checked_before_anything_is_written() {
     for (set, name) in [
         ("tread.tau=0.1", "tread.tau_s"),
-        ("plant.my=1", "plant.my"),
+        ("plant.my=1", "did you mean plant.mu?"),
         ("tread.tau_s=0.1s", "tread.tau_s"),
         ("drive.cruise_speed_mm_s=5mm/s", "drive.cruise_speed_mm_s"),
         ("tread.tau_s=abc", "tread.tau_s"),
@@ -22,13 +22,19 @@ fn parameters_are_checked_before_anything_is_written() {
     }
 }
 
+/// The last seed that two others can follow.
+const LAST: &str = "9223372036854775805";
+
 #[test]
 fn options_are_checked_by_name() {
     for (arguments, names) in [
         ("deploy --rig moon", &["--rig", "moon", "prototype"][..]),
         ("deploy --controller clever", &["--controller", "scheduled"]),
         ("deploy --seed x", &["--seed", "'x'"]),
-        ("deploy --seed -1", &["-1"]),
+        ("deploy --seed -1", &["--seed", "-1", "a whole number, 0 or more"]),
+        ("capture --seed -1", &["--seed", "-1", "a whole number, 0 or more"]),
+        ("montecarlo --seed -1", &["--seed", "-1", "a whole number, 0 or more"]),
+        ("deploy --seed 1.5", &["--seed", "1.5", "a whole number, 0 or more"]),
         ("deploy --seed 18446744073709551615", &["run.seed"]),
         ("deploy --target moon", &["--target <TARGET>", "moon", "sil, board, probe"]),
         ("deploy --sead 1", &["--sead"]),
@@ -38,6 +44,7 @@ fn options_are_checked_by_name() {
         ("montecarlo -n -3", &["-3"]),
         ("montecarlo -n 4 --shard 5/4", &["--shard", "i/n"]),
         ("keys --rig moon", &["--rig"]),
+        ("faults --only preload-senser", &["did you mean \"preload-sensor\"?"]),
         ("faults --only gremlin", &["--only gremlin: no such fault", "preload-sensor stuck"]),
         ("live", &["no terminal"]),
         ("live --headless --listen nowhere", &["--listen nowhere"]),
@@ -58,9 +65,14 @@ fn options_are_checked_by_name() {
         ("stress -n -1", &["--cases <CASES>", "'-1'"]),
         ("stress --seed -1", &["--seed", "-1", "a whole number, 0 or more"]),
         ("montecarlo -n -1", &["-n <N>", "'-1'"]),
-        ("montecarlo -n 2 --seed 9223372036854775807", &["run.seed = 9223372036854775807"]),
-        ("compare -n 2 --seed 9223372036854775807", &["run.seed = 9223372036854775807"]),
-        ("montecarlo -n 1 --shard 2/2", &["--shard 2/2", "none for this one"]),
+        ("montecarlo -n 2 --seed 9223372036854775807", &["run.seed = 9223372036854775807", LAST]),
+        ("compare -n 2 --seed 9223372036854775807", &["run.seed = 9223372036854775807", LAST]),
+        ("faults -n 2 --set run.seed=9223372036854775806", &["run.seed", LAST]),
+        ("montecarlo -n 1 --shard 2/2", &["--shard 2/2", "of 1", "none for this one"]),
+        ("faults --only tick -n 1 --shard 2/2", &["--shard 2/2"]),
+        ("envelope -n 8", &["-n", "8", "8x7"]),
+        ("envelope -n 1x7", &["-n", "1x7", "8x7"]),
+        ("envelope -n axb", &["-n", "axb", "8x7"]),
         ("faults --clean 1 --shard 2/2", &["--shard 2/2", "none for this one"]),
         ("faults --only preload-sensor --shard 90/100", &["--shard 90/100", "none for this one"]),
     ] {
@@ -128,79 +140,4 @@ fn a_crossing_has_a_range_of_speed_and_preload() {
         &["crossing", "--speed-mm-s", "5", "--preload-n", "33", "--set", "tread.tau_s=0"],
         &["tread.tau_s"],
     );
-}
-
-#[test]
-fn an_error_names_the_key_that_was_set_and_the_bound_that_it_broke() {
-    for (set, parts) in [
-        (
-            "preload.cruise_n=60",
-            &["preload.cruise_n = 60", "at most 47.", "preload.limit_n = 50"][..],
-        ),
-        (
-            "preload.limit_n=20",
-            &["preload.limit_n = 20", "at least 34.", "preload.cruise_n = 33.3"],
-        ),
-        ("drive.cruise_speed_mm_s=90", &["drive.cruise_speed_mm_s = 90", "at most"]),
-        ("drive.cruise_speed_mm_s=4", &["drive.cruise_speed_mm_s = 4", "at least 5"]),
-        ("control.safe_speed_mm_s=60", &["control.safe_speed_mm_s = 60", "at most"]),
-        (
-            "rig.step_positions_mm=18,40,95",
-            &["rig.step_positions_mm", "step 3 is at 95 mm", "at most 80"],
-        ),
-        ("rig.travel_mm=50", &["rig.travel_mm = 50", "at least 62"]),
-        (
-            "rig.step_positions_mm=18,20,62",
-            &["rig.step_positions_mm", "step 2 is at 20 mm", "at least"],
-        ),
-        ("rig.wheel_radius_mm=120", &["rig.wheel_radius_mm = 120"]),
-        ("rig.wall_radius_mm=400", &["rig.wall_radius_mm = 400"]),
-    ] {
-        refused(&["deploy", "--set", set], &[&["command line: "], parts].concat());
-    }
-    let directory = tempfile::tempdir().unwrap();
-    std::fs::write(directory.path().join("bad.toml"), "[preload]\ncruise_n = 60\n").unwrap();
-    refused_in(directory.path(), &["deploy", "bad.toml"], &["bad.toml: preload.cruise_n = 60"]);
-}
-
-#[test]
-fn a_near_name_is_offered_whatever_the_group() {
-    for (set, wanted) in [
-        ("tread.mu=0.9", "did you mean plant.mu?"),
-        ("friction=0.9", "did you mean mismatch.friction?"),
-        ("rig.friction=0.9", "did you mean mismatch.friction?"),
-        ("plant.tread_thickness_mm=8", "did you mean mismatch.tread_thickness_mm?"),
-        ("preload.limit=52", "did you mean preload.limit_n?"),
-        ("limit=52", "did you mean preload.limit_n?"),
-        ("cruise_speed=8", "did you mean drive.cruise_speed_mm_s?"),
-        ("control.cruise_speed_mm_s=8", "did you mean drive.cruise_speed_mm_s?"),
-    ] {
-        refused(&["deploy", "--set", set], &[wanted]);
-    }
-    for (faults, wanted) in [
-        (
-            "[{ target = \"preload-senser\", kind = \"stuck\", at_s = 2.0 }]",
-            "did you mean \"preload-sensor\"?",
-        ),
-        (
-            "[{ target = \"preload_sensor\", kind = \"stuck\", at_s = 2.0 }]",
-            "did you mean \"preload-sensor\"?",
-        ),
-        (
-            "[{ target = \"preload-sensor\", kind = \"stock\", at_s = 2.0 }]",
-            "did you mean \"stuck\"?",
-        ),
-    ] {
-        refused(&["deploy", "--set", &format!("run.faults={faults}")], &[wanted]);
-    }
-    refused(&["faults", "--only", "preload-senser"], &["did you mean \"preload-sensor\"?"]);
-}
-
-#[test]
-fn a_negative_seed_gives_one_clear_error() {
-    for verb in ["deploy", "capture", "montecarlo"] {
-        let arguments = [verb, "--seed", "-1"];
-        refused(&arguments, &["--seed", "-1", "a whole number, 0 or more"]);
-    }
-    refused(&["deploy", "--seed", "1.5"], &["--seed", "1.5", "a whole number, 0 or more"]);
 }

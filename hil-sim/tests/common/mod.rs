@@ -35,6 +35,12 @@ pub(crate) fn scenario(preset: &str, direction: Direction, seed: u64) -> Scenari
     scenario
 }
 
+/// A scenario of a preset with these overrides.
+pub(crate) fn overridden(preset: &str, sets: &[&str]) -> Scenario {
+    let sets: Vec<String> = sets.iter().map(|set| (*set).to_owned()).collect();
+    Scenario::resolve(Some(preset), None, &sets).expect("a sound scenario")
+}
+
 /// The opposite direction.
 pub(crate) fn opposite(direction: Direction) -> Direction {
     match direction {

@@ -7,6 +7,7 @@ use hil_sim::plant::ledger::Crossing;
 use hil_sim::plant::rig::{Drives, PlantError, Resolution, VirtualRig};
 use hil_sim::plant::ring::RingParameters;
 use hil_sim::scenario::Scenario;
+use interstage::rig::Rig;
 
 /// Control period, s.
 pub(crate) const TICK_S: f64 = 1e-3;
@@ -35,7 +36,7 @@ pub(crate) fn ideal(preset: &str) -> PlantParameters {
 
 /// Wheel and rubber of both rigs with this many elements.
 pub(crate) fn rubber(elements: usize) -> RingParameters {
-    RingParameters { elements, ..nominal("prototype").ring }
+    RingParameters::of(&Rig::prototype(), elements)
 }
 
 /// The same rubber without memory.
@@ -46,19 +47,12 @@ pub(crate) fn elastic(elements: usize) -> RingParameters {
 
 /// A crossing of the 4 mm step on the converged ring.
 pub(crate) fn fine(speed_mm_s: f64, preload_n: f64, axial: Axial) -> CrossingCase {
-    CrossingCase {
-        ring: rubber(5760),
-        step_height_mm: 4.0,
-        speed_mm_s,
-        preload_n,
-        axial,
-        stride_mm: 0.005,
-    }
+    CrossingCase::of(&Rig::prototype(), (5760, 0.005), (speed_mm_s, preload_n, axial))
 }
 
 /// The same on the ring that deployments use.
 pub(crate) fn usual(speed_mm_s: f64, preload_n: f64, axial: Axial) -> CrossingCase {
-    CrossingCase { ring: rubber(1440), stride_mm: 0.02, ..fine(speed_mm_s, preload_n, axial) }
+    CrossingCase::of(&Rig::prototype(), (1440, 0.02), (speed_mm_s, preload_n, axial))
 }
 
 /// Crosses, or says which crossing could not be made.

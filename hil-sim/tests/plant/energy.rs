@@ -1,8 +1,7 @@
 //! The first law over complete climbs and descents.
 
 use hil_sim::plant::draw::PlantParameters;
-use hil_sim::plant::energy::Energy;
-use hil_sim::plant::rig::{Resolution, VirtualRig};
+use hil_sim::plant::rig::{Energy, Resolution, VirtualRig};
 use hil_sim::scenario::Scenario;
 
 use super::bench::{TICK_S, nominal, roll};
@@ -43,25 +42,24 @@ fn balances(plant: PlantParameters, speed: f64, preload: f64) {
 }
 
 #[test]
-fn the_drives_work_is_found_again_on_the_prototype() {
-    for (speed, preload) in [(8.0, 33.3), (25.0, 48.0), (-8.0, 33.3), (-25.0, 33.3)] {
-        balances(nominal("prototype"), speed, preload);
-    }
-}
-
-#[test]
-fn the_drives_work_is_found_again_under_the_loads_of_the_finite_elements() {
-    for (speed, preload) in [(5.0, 100.0), (12.0, 100.0), (-30.0, 100.0)] {
-        balances(nominal("fe"), speed, preload);
-    }
-}
-
-#[test]
-fn the_drives_work_is_found_again_under_a_heavy_load() {
-    for speed in [8.0, -8.0] {
-        let mut plant = nominal("prototype");
-        plant.load_n = 15.0;
-        balances(plant, speed, 45.0);
+fn the_drives_work_is_found_again_at_any_load_and_speed() {
+    for (preset, load_n, speed, preload) in [
+        ("prototype", None, 8.0, 33.3),
+        ("prototype", None, 25.0, 48.0),
+        ("prototype", None, -8.0, 33.3),
+        ("prototype", None, -25.0, 33.3),
+        ("fe", None, 5.0, 100.0),
+        ("fe", None, 12.0, 100.0),
+        ("fe", None, -30.0, 100.0),
+        ("prototype", Some(15.0), 8.0, 45.0),
+        ("prototype", Some(15.0), -8.0, 45.0),
+    ] {
+        let plant = nominal(preset);
+        balances(
+            PlantParameters { load_n: load_n.unwrap_or(plant.load_n), ..plant },
+            speed,
+            preload,
+        );
     }
 }
 

@@ -6,13 +6,9 @@ use hil_sim::scenario::Scenario;
 use hil_sim::session::{Options, run};
 use interstage::fault::Fault;
 
-use super::bench::{TICK_S, close, deploy, drive, ideal, nominal, roll, steps};
+use crate::common::overridden;
 
-/// The scenario of a preset with these overrides.
-fn scenario(preset: &str, sets: &[&str]) -> Scenario {
-    let sets: Vec<String> = sets.iter().map(|set| (*set).to_owned()).collect();
-    Scenario::resolve(Some(preset), None, &sets).unwrap()
-}
+use super::bench::{TICK_S, close, deploy, drive, ideal, nominal, roll, steps};
 
 #[test]
 fn with_too_little_friction_a_run_does_not_complete() {
@@ -20,7 +16,7 @@ fn with_too_little_friction_a_run_does_not_complete() {
         [("prototype", 0.0), ("prototype", 0.3), ("prototype", 0.6), ("fe", 0.3), ("fe", 0.5)]
     {
         let set = format!("plant.mu={friction}");
-        let recording = run(&scenario(preset, &[&set]), Options::ROWS).unwrap();
+        let recording = run(&overridden(preset, &[&set]), Options::ROWS).unwrap();
         let summary = &recording.summary;
         assert!(!summary.completed, "{preset} at {friction}");
         let faults: Vec<u16> = summary.faults.iter().map(|fault| fault.code).collect();
@@ -95,7 +91,7 @@ fn one_wheel_does_not_lift_the_whole_load_by_friction_alone() {
 fn the_whole_load_stops_a_run_unless_the_arm_helps() {
     let summary = |coupling: &str| {
         let sets = ["plant.top_load_share=1", coupling];
-        run(&scenario("prototype", &sets), Options::default()).unwrap().summary
+        run(&overridden("prototype", &sets), Options::default()).unwrap().summary
     };
     for coupling in ["plant.arm_coupling=0", "plant.arm_coupling=-1"] {
         let stuck = summary(coupling);
@@ -130,7 +126,7 @@ fn thrust_turns_into_radial_force_by_the_arm() {
             let sets =
                 [format!("plant.arm_coupling={coupling}"), format!("run.direction={direction}")];
             let sets: Vec<&str> = sets.iter().map(String::as_str).collect();
-            let summary = run(&scenario("prototype", &sets), Options::default()).unwrap().summary;
+            let summary = run(&overridden("prototype", &sets), Options::default()).unwrap().summary;
             assert!(summary.completed && summary.slip_mm == 0.0, "{sets:?}: {summary:?}");
         }
     }

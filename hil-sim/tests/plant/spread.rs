@@ -1,7 +1,7 @@
 //! What a seed draws, against the meaning that the scenario's keys document.
 
 use hil_sim::plant::draw::PlantParameters;
-use hil_sim::plant::section::Section;
+use hil_sim::plant::spread::Section;
 use hil_sim::plant::spread::Spread;
 use hil_sim::scenario::Scenario;
 

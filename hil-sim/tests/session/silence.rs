@@ -10,11 +10,10 @@ use hil_sim::session::{Options, run};
 use hil_sim::testing::long;
 use interstage::fault::Limit;
 
-use crate::common::DIRECTIONS;
+use crate::common::{DIRECTIONS, overridden};
 
 fn scenario(sets: &[&str], direction: Direction) -> Scenario {
-    let sets: Vec<String> = sets.iter().map(|set| (*set).to_owned()).collect();
-    let mut scenario = Scenario::resolve(None, None, &sets).expect("a sound scenario");
+    let mut scenario = overridden("prototype", sets);
     scenario.run.direction = direction;
     scenario
 }

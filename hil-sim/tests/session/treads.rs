@@ -1,14 +1,13 @@
 //! Treads that the controller is not told of.
 
 use hil_sim::record::{Recording, Tick};
-use hil_sim::scenario::Scenario;
 use hil_sim::session::{Options, run};
+
+use crate::common::overridden;
 
 /// A deployment with these overrides, its reference gap, mm, and whether it completed.
 fn deployed(sets: &[&str]) -> (Recording, f64) {
-    let sets: Vec<String> = sets.iter().map(|set| (*set).to_owned()).collect();
-    let scenario = Scenario::resolve(None, None, &sets).expect("a sound scenario");
-    let recording = run(&scenario, Options::ROWS).expect("a run");
+    let recording = run(&overridden("prototype", sets), Options::ROWS).expect("a run");
     assert!(recording.summary.completed, "{sets:?}");
     let reference = recording.summary.gap_ref_mm;
     (recording, reference)

@@ -1,19 +1,20 @@
-//! The same run without the fault: when it moves and crosses, and what it reports.
+//! The operator of a run, who deploys and, after arrival, retracts; and the same run without the
+//! fault: when it moves and crosses, and what it reports.
 
 use interstage::model::Planner;
 use interstage::rig::RigError;
-use interstage::supervise::{Leg, Mode};
+use interstage::supervise::{Command, Leg, Mode};
 use interstage::tick::{Event, Output};
 use interstage::units::Direction;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
 use super::longest_s;
-use super::operator::Operator;
 use crate::scenario::Scenario;
 use crate::session::RunningRig;
 
 /// A run without fault.
+#[derive(Default)]
 pub struct Twin {
     /// From the command to the end, s since boot.
     pub started_s: f64,
@@ -60,12 +61,8 @@ impl Twin {
     fn new(scenario: &Scenario) -> Result<Self, RigError> {
         let planner = Planner::try_build(&scenario.rig)?;
         Ok(Self {
-            started_s: 0.0,
-            ended_s: 0.0,
-            crossing_s: None,
-            crossings: Vec::new(),
-            limits: Vec::new(),
             gap_ref_mm: Direction::ALL.map(|direction| planner.gap_ref(direction).to_num()),
+            ..Self::default()
         })
     }
 
@@ -96,5 +93,51 @@ impl Twin {
         let at_s = random.random_range(from_s..to_s.max(from_s + 1e-3));
         // On a tick.
         (at_s * 1e3).round() * 1e-3
+    }
+}
+
+/// Ticks that the drive rests at the far end.
+const DWELL_TICKS: u32 = 100;
+
+/// The operator.
+#[derive(Clone, Debug, Default)]
+pub struct Operator {
+    started: bool,
+    turned: bool,
+    rested: u32,
+}
+
+impl Operator {
+    /// The command of a tick in which the drive is in this mode.
+    pub fn command(&mut self, mode: Mode) -> Option<Command> {
+        if mode == Mode::Idle && !self.started {
+            self.started = true;
+            return Some(if self.turned { Command::Retract } else { Command::Start });
+        }
+        if mode == Mode::Complete(Direction::Deploy) && !self.turned {
+            self.rested += 1;
+            if self.rested > DWELL_TICKS {
+                self.turned = true;
+                return Some(Command::Retract);
+            }
+        }
+        None
+    }
+
+    /// The controller has restarted: the last command is given again.
+    pub const fn press_again(&mut self) {
+        self.started = false;
+    }
+
+    /// Whether the run has been started.
+    pub const fn started(&self) -> bool {
+        self.started
+    }
+
+    /// Whether it is over: at rest, and no further command comes.
+    pub fn over(&self, mode: Mode) -> bool {
+        self.started
+            && mode.is_at_rest()
+            && (mode != Mode::Complete(Direction::Deploy) || self.turned)
     }
 }

@@ -70,7 +70,7 @@ impl Factors {
 }
 
 /// The problem of one rim and its last solution.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Complementarity {
     /// Displacement by a pressure, by their distance from -(n-1) to n-1 elements.
     compliance: Vec<f64>,
@@ -79,8 +79,9 @@ pub(super) struct Complementarity {
     pattern: Vec<usize>,
     indices: Vec<usize>,
     right: Vec<f64>,
-    pressures: Vec<f64>,
-    displacement: Vec<f64>,
+    /// Pressures and displacements, mm, of the last solution, by element of the row.
+    pub(super) pressures: Vec<f64>,
+    pub(super) displacement: Vec<f64>,
 }
 
 impl Complementarity {
@@ -89,31 +90,12 @@ impl Complementarity {
         let lags = &compliance[1..most];
         let compliance: Vec<f64> =
             lags.iter().rev().chain(&compliance[..1]).chain(lags).copied().collect();
-        Self {
-            compliance,
-            most,
-            kept: Vec::new(),
-            pattern: Vec::new(),
-            indices: Vec::new(),
-            right: Vec::new(),
-            pressures: Vec::new(),
-            displacement: Vec::new(),
-        }
+        Self { compliance, most, ..Self::default() }
     }
 
     /// Compliance of an element at itself.
     pub(super) fn own(&self) -> f64 {
         self.compliance[self.most - 1]
-    }
-
-    /// Pressures of the last solution, by element of the row.
-    pub(super) fn pressures(&self) -> &[f64] {
-        &self.pressures
-    }
-
-    /// Displacements of the last solution, mm, by element of the row.
-    pub(super) fn displacement(&self) -> &[f64] {
-        &self.displacement
     }
 
     /// Solves for the displacements that the walls ask for, mm, starting from the elements
@@ -255,9 +237,9 @@ mod tests {
             let mut active = thought;
             contact.solve(&wanted, &mut active);
             for i in 0..40 {
-                let p = contact.pressures()[i];
-                let z: f64 = (0..40).map(|j| compliance[i.abs_diff(j)] * contact.pressures()[j]).sum();
-                prop_assert!((z - contact.displacement()[i]).abs() < 1e-9);
+                let p = contact.pressures[i];
+                let z: f64 = (0..40).map(|j| compliance[i.abs_diff(j)] * contact.pressures[j]).sum();
+                prop_assert!((z - contact.displacement[i]).abs() < 1e-9);
                 prop_assert!(p >= 0.0 && z >= wanted[i] - 1e-9, "{i}: {p} {z} {}", wanted[i]);
                 prop_assert!(p == 0.0 || (z - wanted[i]).abs() < 1e-9);
             }

@@ -69,7 +69,7 @@ struct Ready {
 }
 
 /// The rim of a coupled tread.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Coupled {
     /// Relaxed shear modulus over k_inf, mm.
     modulus_mm: f64,
@@ -102,13 +102,9 @@ impl Coupled {
             u: vec![0.0; count],
             q: [vec![0.0; count], vec![0.0; count]],
             active: vec![false; count],
-            ready: Ready::default(),
-            met: Vec::new(),
-            wanted: Vec::new(),
-            touching: Vec::new(),
-            z: Vec::new(),
             stiffer: 1.0,
             forces: vec![0.0; count],
+            ..Self::default()
         }
     }
 
@@ -178,7 +174,7 @@ impl Coupled {
             }
             *u = if u.abs() < NONE_MM { 0.0 } else { *u };
             let near = place.checked_sub(ready.near.start);
-            let pressure = near.and_then(|near| contact.pressures().get(near));
+            let pressure = near.and_then(|near| contact.pressures.get(near));
             let force = scale * pressure.copied().unwrap_or(0.0);
             work_mj += 0.5 * (force + forces[i]) * (*u - old);
             forces[i] = force;
@@ -221,7 +217,7 @@ impl Coupled {
         }));
         // Beside the nearest points of the wall, as far as a bulge may reach.
         let lowest = motion.height_mm - LOWER_MM;
-        let (floor, step) = super::window::reach(&motion.wall, lowest - BULGE_MM, radius);
+        let (floor, step) = super::layout::reach(&motion.wall, lowest - BULGE_MM, radius);
         let (from, to) = (-floor, step.map_or(floor, |(_, to)| to.max(floor)));
         let at = |angle: f64| ((turned + angle) / pitch).floor() as i64 - first;
         let facing = ready.facing.len() as i64;
@@ -275,7 +271,7 @@ impl Coupled {
         let mut out = Contact { depth_mm, floor_pressure: f64::NEG_INFINITY, ..Contact::default() };
         let per_mm = modulus / contact.own();
         for (i, (element, met)) in near.iter().zip(met.iter()).enumerate() {
-            let pressure = contact.pressures()[i];
+            let pressure = contact.pressures[i];
             if touching[i] {
                 let force = scale * pressure;
                 let (c, s) = (force * element.cos, force * element.sin);
@@ -295,7 +291,7 @@ impl Coupled {
                 let raw = if touching[i] {
                     stiffer * modulus * pressure
                 } else {
-                    per_mm * (wanted[i] - contact.displacement()[i])
+                    per_mm * (wanted[i] - contact.displacement[i])
                 };
                 out.floor_pressure = out.floor_pressure.max(raw);
             }

@@ -155,7 +155,7 @@ pub(in crate::plant) fn modulus_mm(parameters: &RingParameters) -> f64 {
         let wanted: Vec<f64> = angles.iter().map(|a| step(height, *a)).collect();
         contact.solve(&wanted, &mut active);
         // The wall that is just touched carries nothing: its deepest point sets the height.
-        let sunk = angles.iter().zip(contact.displacement());
+        let sunk = angles.iter().zip(&contact.displacement);
         let deepest = sunk.map(|(a, z)| radius - height / a.cos() - z);
         if deepest.fold(f64::NEG_INFINITY, f64::max) > 0.0 {
             low = height;
@@ -167,7 +167,7 @@ pub(in crate::plant) fn modulus_mm(parameters: &RingParameters) -> f64 {
     let ahead = ((radius + gap_mm).powi(2) - height * height).sqrt();
     let deepest = radius - ahead.hypot(height - step_mm);
     let stiffer = 1.0 + STIFFENING * deepest / thickness;
-    let layer: f64 = angles.iter().zip(contact.pressures()).map(|(a, p)| p * a.cos()).sum();
+    let layer: f64 = angles.iter().zip(contact.pressures).map(|(a, p)| p * a.cos()).sum();
     let ring: f64 = angles.iter().map(|a| step(radius, *a).max(0.0) * a.cos()).sum();
     ring / (stiffer * layer)
 }

@@ -1,4 +1,4 @@
-//! What a ring is made of.
+//! What a ring is made of, and what the wall does to it.
 
 use interstage::rig::Rig;
 
@@ -54,5 +54,56 @@ impl RingParameters {
     /// Relaxation times, the faster one first, s.
     pub fn relaxations_s(&self) -> [f64; 2] {
         [self.tau_s / self.second_relaxation, self.tau_s * self.second_relaxation]
+    }
+}
+
+/// Resultants of the contact pressure.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Contact {
+    /// Sum of p over all contact, N.
+    pub normal_n: f64,
+    /// Sum of p cos(psi) over all contact, N.
+    pub cosine_n: f64,
+    /// Sum of p sin(psi) over all contact, N.
+    pub sine_n: f64,
+    /// The part of `cosine_n` carried by the floor, N.
+    pub floor_n: f64,
+    /// Sum of p cos(psi) over face and top of the step ahead, N.
+    pub step_cosine_n: f64,
+    /// Sum of p sin(psi) over face and top of the step ahead, N.
+    pub step_sine_n: f64,
+    /// Largest depth, at the point of the wall nearest to the centre, mm; negative is
+    /// clearance.
+    pub depth_mm: f64,
+    /// Arc in contact times width, mm^2.
+    pub area_mm2: f64,
+    /// Largest pressure on the floor before it is cut off at zero, N/mm^2; where no
+    /// element reaches the floor, minus what a fresh one would carry as deep in it as it
+    /// is away, so that the instant of a touch-down lies on a straight line.
+    pub floor_pressure: f64,
+    /// Derivatives of `cosine_n` and `sine_n` by the centre's height, N/mm.
+    pub slope: (f64, f64),
+}
+
+impl Contact {
+    /// The contact a little higher up, by its derivatives, its parts as the whole.
+    pub fn moved(self, change_mm: f64) -> Self {
+        let cosine_n = self.cosine_n + self.slope.0 * change_mm;
+        let part = cosine_n / self.cosine_n;
+        Self {
+            normal_n: self.normal_n * part,
+            cosine_n,
+            sine_n: self.sine_n + self.slope.1 * change_mm,
+            floor_n: self.floor_n * part,
+            step_cosine_n: self.step_cosine_n * part,
+            step_sine_n: self.step_sine_n * part,
+            depth_mm: self.depth_mm - change_mm,
+            ..self
+        }
+    }
+
+    /// Magnitude of the step's force on the wheel, N.
+    pub fn step_force_n(&self) -> f64 {
+        self.step_cosine_n.hypot(self.step_sine_n)
     }
 }

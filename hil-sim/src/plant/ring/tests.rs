@@ -1,3 +1,4 @@
+use interstage::rig::Rig;
 use proptest::prelude::*;
 
 use super::super::wall::tests::Facet;
@@ -5,16 +6,7 @@ use super::super::wall::{Step, Wall};
 use super::*;
 
 fn rubber(elements: usize) -> RingParameters {
-    RingParameters {
-        radius_mm: 25.0,
-        width_mm: 28.0,
-        k_inf: 0.6044,
-        k_0: 0.6044 * 4.2235,
-        tau_s: 0.1059,
-        elements,
-        tread_thickness_mm: 0.0,
-        second_relaxation: 1.0,
-    }
+    RingParameters::of(&Rig::fe(), elements)
 }
 
 /// Normal, cosine and sine sums of a fresh ring, and the floor's part, element by element

@@ -1,6 +1,6 @@
 //! Title and legend of a plot: in its picture, or as text of a page.
 
-use super::super::mesh::TEXT_PX;
+use super::super::axis::TEXT_PX;
 use super::super::svg::{escape, hex, width};
 use super::{Look, Panel, RIGHT, Shape};
 

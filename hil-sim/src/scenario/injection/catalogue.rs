@@ -3,7 +3,7 @@
 
 use std::sync::LazyLock;
 
-use super::kinds::{Kind, Target};
+use super::{Kind, Target};
 
 /// A fault that a scenario can name.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -112,14 +112,8 @@ fn actuator(target: Target) -> [Entry; 8] {
 
 /// Those of software, in the order of the matrix.
 pub static CATALOGUE: LazyLock<Vec<Entry>> = LazyLock::new(|| {
-    use Kind::{
-        Broken, Doubled, Flooding, Gone, Hung, Off, Offset, Overrun, Random, Recorded, Slip, Torn,
-    };
-    use Target::{
-        Angle, Commands, CompressionSensor, Drive, DriveReadback, Encoder, Load, Log, Model,
-        PreloadSensor, Pretightener, PretightenerReadback, Readback, Reset, Spring, Tick, Tread,
-        Wheel,
-    };
+    use Target::Reset;
+    use {Kind::*, Target::*};
     let mut all = Vec::new();
     for (sensor, gain, offset) in [
         (Encoder, 1.5, (2.0, 100.0, "mm", "jumps by so much once")),
@@ -173,16 +167,8 @@ const fn turned(target: Target) -> Entry {
 
 /// Those of the board itself, in the order of the matrix.
 pub const HARDWARE: &[Entry] = {
-    use Kind::{
-        BitErrors, Disturbed, Flooding, Gone, Halted, Hung, Off, OneWrongBit, Reset, Shorted,
-        Stalled, Stuck, Torn, TwoWrongBits, Weak,
-    };
-    use Target::{
-        AngleBus, ArmAngleTask, CompressionSensorTask, Debugger, Dma, EncoderLineA, EncoderLineB,
-        HostLine, Image, ImageSet, Interrupt, JournalTask, LineTask, Magnet, ModelTask,
-        OptionBytes, ParameterSave, PreloadSensorConverter, PreloadSensorTask, Processor, ResetPin,
-        SpareSet, StopWire, StoredSet, Supply, TickTask, Timer, TreadConverter, WheelEncoderTask,
-    };
+    use Kind::Reset;
+    use {Kind::*, Target::*};
     &[
         one(PreloadSensorConverter, Stuck, 30_000.0, (0.0, 65_535.0), "of 65535", GIVES),
         one(TreadConverter, Stuck, 30_000.0, (0.0, 65_535.0), "of 65535", GIVES),

@@ -3,7 +3,7 @@
 
 use anyhow::{Context, Result, ensure};
 use hil_sim::plant::balance::Axial;
-use hil_sim::plant::crossing::cross;
+use hil_sim::plant::crossing::{CrossingCase, cross};
 use hil_sim::plant::precision::{self, Setting};
 use hil_sim::rollout::{CrossingSetup, Wheel};
 use interstage::model::tread::{Tread, TreadState};
@@ -70,7 +70,7 @@ pub fn measure() -> Result<Vec<Variant>> {
     let fine = Setting::usual().finer(FINER);
     let exact = precision::cases()
         .into_par_iter()
-        .map(|case| Ok(cross(&precision::case(&rig, fine, case))?.gap_mm))
+        .map(|case| Ok(cross(&CrossingCase::of(&rig, fine.both(), case))?.gap_mm))
         .collect::<Result<Vec<f64>>>()?;
     let (seconds, gaps) = least(|| on_host(&tread, std::hint::black_box(&inputs)));
     let off = |(gap, exact): (i32, f64)| Q16::from_bits(gap).to_num::<f64>() / exact - 1.0;

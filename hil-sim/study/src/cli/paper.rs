@@ -58,7 +58,7 @@ fn human(study: &Study, files: &[PathBuf]) -> String {
     let held = study.claims.iter().filter(|claim| claim.holds).count();
     let rows = study.claims.iter().map(|claim| {
         let verdict = if claim.holds { "holds" } else { "does not hold" };
-        vec![claim.claim.to_owned(), claim.figure.to_owned(), verdict.to_owned()]
+        vec![claim.claim.to_string(), claim.figure.to_owned(), verdict.to_owned()]
     });
     format!(
         "{} figures; of {} claims {held} hold and {} do not\n{}\n{}",

@@ -58,12 +58,7 @@ impl Case {
         let rig = self.loads.rig();
         let step = rig.rig.step_height_mm;
         let centre = rig.rig.wall_radius_mm - rig.rig.wheel_radius_mm - step * level as f64;
-        let arm = Arm {
-            length_mm: rig.rig.arm_length_mm,
-            pivot_mm: rig.rig.arm_pivot_radius_mm,
-            coupling: rig.plant.arm_coupling,
-        };
-        (arm, centre)
+        (Arm::of(&rig), centre)
     }
 
     /// Radial force on a wheel that lifts its load from sleeve `level`, N: the preload,

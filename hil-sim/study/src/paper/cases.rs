@@ -2,8 +2,8 @@
 //! loads.
 
 use super::case::{Case, Loads};
+use super::histories::Quantity;
 use super::histories::{Histories, panels};
-use super::history::Quantity;
 use super::published::{CASES, COLLISION_N};
 use super::transitions::{count_humps, first_rises, peaks_text};
 use crate::figure::{Claim, Figure, SOURCES, Series, Source};
@@ -41,12 +41,11 @@ pub fn figure(all: &[Histories]) -> Figure {
 pub fn claims(all: &[Histories]) -> Vec<Claim> {
     let of = |id| Claim::of("fig11", SECTION, id);
     let [slow, pressed, fast, slowest] = [&all[0], &all[1], &all[2], &all[3]];
-    let two = |a: &Histories, b: &Histories, quantity| {
-        format!(
-            "{}; {} (theory; simulation; virtual rig, by stage).",
-            peaks_text(a, quantity),
-            peaks_text(b, quantity)
-        )
+    // The first peak rises (falls) from the one case to the other.
+    let rises = |id, (a, b): (&Histories, &Histories), quantity, sense, claim, reason| {
+        let [before, after] = [a, b].map(|one| peaks_text(one, quantity));
+        let found = format!("{before}; {after} (theory; simulation; virtual rig, by stage).");
+        of(id).explained(claim, first_rises(a, b, quantity, sense), found, reason)
     };
     let (collision, impact, vibration) =
         (Quantity::Collision, Quantity::Impact, Quantity::Vibration);
@@ -61,47 +60,40 @@ pub fn claims(all: &[Histories]) -> Vec<Claim> {
     };
     let humps = all.iter().map(humps).max().unwrap_or(0);
     vec![
-        of("collision-decays-periodically").judged(
+        of("collision-decays-periodically").explained(
             "The collision force decays periodically, because the tread is elastic.",
             humps > 3,
             format!("At most {humps} peaks in a deployment with three transitions, in the simulation."),
             "One peak a transition. The wheel closes in on the corner at 2 to 4 mm/s and never leaves it: \
              it climbs and does not bounce.",
         ),
-        of("collision-falls-with-preload").judged(
+        rises("collision-falls-with-preload", (slow, pressed), collision, -1.0,
             "At 5 mm/s the collision force of the first transition is smaller at 120 N than at 100 N.",
-            first_rises(slow, pressed, collision, -1.0),
-            two(slow, pressed, collision),
             "It is larger, as climbing must be: the axial force is the pressing force times the tangent of \
              the angle at which the corner bears. The study contradicts itself here between its first and \
              its second transition.",
         ),
-        of("collision-grows-with-speed").judged(
+        rises("collision-grows-with-speed", (slow, fast), collision, 1.0,
             "At 100 N the collision is larger at 8 mm/s than at 5 mm/s.",
-            first_rises(slow, fast, collision, 1.0),
-            two(slow, fast, collision),
             "",
         ),
-        of("collision-grows-with-speed-120").judged(
+        rises("collision-grows-with-speed-120", (slowest, pressed), collision, 1.0,
             "At 120 N, too, the collision grows with the speed (5 mm/s against 3 mm/s).",
-            first_rises(slowest, pressed, collision, 1.0),
-            two(slowest, pressed, collision),
             "",
         ),
         of("second-collision-grows-with-preload").judged(
             "In the second transition more preload makes for a larger force.",
             stage(1).iter().all(|&part| part > 0.0),
             format!("{} from 100 to 120 N at 5 mm/s (theory, simulation, virtual rig).", percent(stage(1))),
-            "",
         ),
-        of("third-collision-equal").judged(
+        of("third-collision-equal").explained(
             "In the third transition 20 N more preload make no difference: the peaks are nearly identical.",
             stage(2).iter().all(|part| part.abs() < NEARLY),
             format!("{} from 100 to 120 N at 5 mm/s (theory, simulation, virtual rig).", percent(stage(2))),
             "Nothing in the third transition differs but the inclination of the arm, by two degrees from the \
              second: more preload has the same effect in all three.",
         ),
-        of("stress-of-collision-less-preload").judged(
+        of("stress-of-collision-less-preload").explained(
             "The stress wave is determined by the difference between collision force and preload.",
             SOURCES.into_iter().all(|source| {
                 let of = |quantity| all.iter().map(move |one: &Histories| one.peaks(quantity, source)[0].value);
@@ -133,24 +125,17 @@ pub fn claims(all: &[Histories]) -> Vec<Claim> {
                     .flat_map(|one| SOURCES.map(|source| one.left_over(impact, source)))
                     .fold(0.0, f64::max)
             ),
-            "",
         ),
-        of("impact-falls-with-preload").judged(
+        rises("impact-falls-with-preload", (slow, pressed), impact, -1.0,
             "More preload makes for a smaller impact in the first transition.",
-            first_rises(slow, pressed, impact, -1.0),
-            two(slow, pressed, impact),
             "The force grows more than the area on which it acts.",
         ),
-        of("vibration-grows-with-speed").judged(
+        rises("vibration-grows-with-speed", (slow, fast), vibration, 1.0,
             "At the same load and preload the vibration amplitude grows with the speed.",
-            first_rises(slow, fast, vibration, 1.0),
-            two(slow, fast, vibration),
             "",
         ),
-        of("vibration-falls-with-preload").judged(
+        rises("vibration-falls-with-preload", (slow, pressed), vibration, -1.0,
             "At the same load and speed more preload makes for a smaller vibration amplitude.",
-            first_rises(slow, pressed, vibration, -1.0),
-            two(slow, pressed, vibration),
             "The arm's deflection follows the collision force, which grows. What does fall is the gap, which \
              the study equates with the amplitude: figures 15 and 16.",
         ),

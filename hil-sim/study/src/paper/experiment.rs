@@ -14,7 +14,7 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 use super::case::{Arms, Case};
-use super::history::{History, Instant};
+use super::histories::{History, Instant};
 use super::measure::{collision_n, impact_kpa, resistance};
 use super::published::{LOG_S, RUNS, RUNS_OF_A_MEAN};
 use super::theory::area_of_depth_mm2;

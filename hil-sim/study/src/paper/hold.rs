@@ -6,7 +6,7 @@ use interstage::rig::Rig;
 
 use super::case::{Case, Loads};
 use super::experiment::{Experiment, Reading, marks};
-use super::history::Points;
+use super::histories::Points;
 use super::published::{CONSTRAINED_HZ, FREE_HZ, LEAST_PRELOAD_N, LEAST_SPEED_MM_S, RIG_PRELOAD_N};
 use super::simulation;
 use super::sweeps::Sweep;
@@ -16,9 +16,8 @@ use crate::reference::beam::BeamError;
 use crate::reference::vibration::Arm;
 use hil_sim::plant::balance::{Axial, BalanceError};
 use hil_sim::plant::crossing::{CrossingCase, cross};
-use hil_sim::plant::ring::RingParameters;
-use hil_sim::plant::section::Section;
 use hil_sim::plant::spread::Noise;
+use hil_sim::plant::spread::Section;
 use hil_sim::rollout::{CrossingSetup, Wheel};
 
 /// The safe point, the faster one without and the faster one with more preload.
@@ -160,9 +159,8 @@ impl Hold {
                      nothing is fitted to that.",
                     percent(apart(2)), percent(apart(1)), RIG_PRELOAD_N.0, RIG_PRELOAD_N.1
                 ),
-                "",
             ),
-            of(DISCUSSED, "gap-as-on-the-continuous-surface").judged(
+            of(DISCUSSED, "gap-as-on-the-continuous-surface").explained(
                 "Raising the preload makes the gap in the transition that of the continuous surface.",
                 readings().map(|r| r.true_gap_mm).fold(0.0, f64::max) <= separation,
                 format!(
@@ -173,7 +171,7 @@ impl Hold {
                 "A wheel that bears on floor and corner always leaves the root of the step free. What can be \
                  held is the gap of a slower crossing, and the controller takes that as its reference.",
             ),
-            of(INTRODUCED, "gap-in-proportion-to-speed").judged(
+            of(INTRODUCED, "gap-in-proportion-to-speed").explained(
                 "At constant preload the gap expands in proportion to the speed.",
                 ((high / low) / (to / from) - 1.0).abs() < 0.1,
                 format!(
@@ -190,9 +188,8 @@ impl Hold {
                     "By {swing:.2} N on average up to lift-off, with the preload loop closed; the spring \
                      alone would give {unregulated:.1} N a step."
                 ),
-                "",
             ),
-            of(INTRODUCED, "least-preload-100").judged(
+            of(INTRODUCED, "least-preload-100").explained(
                 "Under its top load the drive needs a radial preload of about 100 N (one third of the entire \
                  drive) to work.",
                 (self.least_preload_n / LEAST_PRELOAD_N - 1.0).abs() < 0.2,
@@ -212,9 +209,8 @@ impl Hold {
                      needs a friction of {:.2}; ours has {}.",
                     self.friction_alone, rig.plant.mu
                 ),
-                "",
             ),
-            of(INTRODUCED, "least-speed-meets-a-natural-frequency").judged(
+            of(INTRODUCED, "least-speed-meets-a-natural-frequency").explained(
                 "At the least useful speed of 2.9741 mm/s the wheel is excited close to its natural \
                  frequency.",
                 [CONSTRAINED_HZ, FREE_HZ].iter().any(|hz| (least_hz / hz - 1.0).abs() < 0.1),
@@ -233,13 +229,11 @@ impl Hold {
                     "A force of 1 N at {CONSTRAINED_HZ} Hz moves the arm by {resonant:.1} µm, at the ripple's frequency \
                      of 8 mm/s by {at_fastest:.2} µm."
                 ),
-                "",
             ),
             of("Boundary conditions", "six-stages").judged(
                 "A complete transition has six contact stages.",
                 staged,
                 "The controller recognises all six in every run of the virtual rig.".into(),
-                "",
             ),
         ]
     }
@@ -266,14 +260,8 @@ fn secant(
 
 /// Friction that a driven crossing takes at 5 mm/s.
 fn friction(rig: &Rig, pressing_n: f64, load_n: f64) -> Result<f64, BalanceError> {
-    let result = cross(&CrossingCase {
-        ring: RingParameters::of(rig, COARSE.0),
-        step_height_mm: rig.rig.step_height_mm,
-        speed_mm_s: rig.control.safe_speed_mm_s,
-        preload_n: pressing_n,
-        axial: Axial::Driven(load_n),
-        stride_mm: COARSE.1,
-    })?;
+    let of = (rig.control.safe_speed_mm_s, pressing_n, Axial::Driven(load_n));
+    let result = cross(&CrossingCase::of(rig, COARSE, of))?;
     Ok(result.mu_needed)
 }
 

@@ -84,7 +84,7 @@ mod tests {
     use crate::paper::case::{Case, Loads};
     use crate::paper::experiment;
     use crate::paper::histories::Histories;
-    use crate::paper::history::Quantity;
+    use crate::paper::histories::Quantity;
 
     #[test]
     fn the_area_is_that_of_a_fine_sum() {

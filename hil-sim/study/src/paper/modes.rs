@@ -132,9 +132,8 @@ impl Modes {
                      wheel, axle and what yields in the clamp; {:.1} Hz without.",
                     constrained, self.tip_mass_kg * 1e3, self.bare_hz.0
                 ),
-                "",
             ),
-            of("seventh-free-163").judged(
+            of("seventh-free-163").explained(
                 "The seventh free mode is 163 Hz.",
                 near(free, FREE_HZ) || near(self.bare_hz.1, FREE_HZ),
                 format!("{free:.0} Hz with the mass at the wheel's end, {:.0} Hz without.", self.bare_hz.1),
@@ -150,7 +149,6 @@ impl Modes {
                      below {FREE_HZ} Hz.",
                     ripple_hz.0, ripple_hz.1
                 ),
-                "",
             ),
         ]
     }

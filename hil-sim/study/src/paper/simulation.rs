@@ -4,7 +4,7 @@
 use anyhow::Result;
 
 use super::case::{Arms, Case};
-use super::history::{History, INTERVAL_S, Instant};
+use super::histories::{History, INTERVAL_S, Instant};
 use super::measure::{corner_area_mm2, stress_kpa};
 use super::theory::{Drive, Lift};
 use crate::reference::collision::dynamic;
@@ -12,7 +12,6 @@ use crate::reference::impact::Rod;
 use crate::reference::{ReferenceCase, Rubber};
 use hil_sim::plant::balance::{Axial, BalanceError};
 use hil_sim::plant::crossing::{CrossingCase, cross};
-use hil_sim::plant::ring::RingParameters;
 
 /// Elements of the ring and axial travel of a step, mm, of single crossings: the gap is
 /// within 0.2 % of the converged one.
@@ -36,18 +35,15 @@ pub fn lift(case: &Case, drive: Drive, level: usize) -> Result<Lift, BalanceErro
         Drive::Pushed => (Axial::Pushed, case.preload_n),
         Drive::Driven => (Axial::Driven(case.load_n()), case.pressing_n(level)),
     };
-    let ring = RingParameters::of(&rig, ELEMENTS);
-    let step = rig.rig.step_height_mm;
-    let result = cross(&CrossingCase {
-        ring,
-        step_height_mm: step,
-        speed_mm_s: case.speed_mm_s,
-        preload_n,
-        axial,
-        stride_mm: STRIDE_MM,
-    })?;
+    let of = (case.speed_mm_s, preload_n, axial);
+    let crossing = CrossingCase::of(&rig, (ELEMENTS, STRIDE_MM), of);
+    let result = cross(&crossing)?;
     let (x, y) = result.lift;
-    let area = corner_area_mm2((ring.radius_mm, ring.width_mm), -x, y - step);
+    let area = corner_area_mm2(
+        (crossing.ring.radius_mm, crossing.ring.width_mm),
+        -x,
+        y - crossing.step_height_mm,
+    );
     Ok(Lift {
         gap_mm: result.gap_mm,
         depth_mm: result.lift_depth_mm,

@@ -6,7 +6,7 @@ use anyhow::{Context, Result};
 use interstage::units::Direction;
 
 use super::case::{Arms, Case};
-use super::history::{History, INTERVAL_S, Instant};
+use super::histories::{History, INTERVAL_S, Instant};
 use super::measure::{corner_area_mm2, stress_kpa};
 use hil_sim::plant::balance::{Axial, Balance};
 use hil_sim::plant::ring::{Motion, Ring, RingParameters};
@@ -125,12 +125,7 @@ pub fn deployment(case: &Case, arms: &Arms) -> Result<History> {
         let local = wall.local(x);
         height += base - local.base_mm;
         base = local.base_mm;
-        let balance = Balance {
-            preload_n: case.pressing_n(local.level),
-            spring_n_per_mm: 0.0,
-            arm_n: 0.0,
-            axial: Axial::Driven(case.load_n()),
-        };
+        let balance = Balance::under(case.pressing_n(local.level), Axial::Driven(case.load_n()));
         let motion = Motion { wall: local, height_mm: height, turn_rad, dt_s };
         let solved = balance.solve(&mut ring, motion)?;
         height = solved.height_mm;

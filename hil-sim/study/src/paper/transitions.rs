@@ -2,8 +2,8 @@
 
 use super::case::{Case, Loads};
 use super::experiment::STAGES;
+use super::histories::Quantity;
 use super::histories::{Histories, panels};
-use super::history::Quantity;
 use crate::figure::{Claim, Figure, SOURCES, Source};
 
 /// Cases: the study's four at a third of their preload, which spans the 33 to 40 N that
@@ -83,7 +83,7 @@ pub fn claims(all: &[Histories]) -> Vec<Claim> {
     let faster = all_pairs(all, |a, b| a.preload_n == b.preload_n && a.speed_mm_s < b.speed_mm_s);
     let pressed = all_pairs(all, |a, b| a.speed_mm_s == b.speed_mm_s && a.preload_n < b.preload_n);
     vec![
-        of("three-sources-agree").fitted().judged(
+        of("three-sources-agree").fitted().explained(
             "Collision, impact and vibration show the same trends in theory, simulation and \
              virtual rig.",
             shapes.iter().all(|&shape| shape > 0.9),
@@ -98,9 +98,8 @@ pub fn claims(all: &[Histories]) -> Vec<Claim> {
             "The peaks of the collision fall from the first transition to the third.",
             falls(Quantity::Collision),
             texts(Quantity::Collision),
-            "",
         ),
-        of("impact-peaks-fall").judged(
+        of("impact-peaks-fall").explained(
             "The peaks of the impact fall from the first transition to the third.",
             falls(Quantity::Impact),
             texts(Quantity::Impact),
@@ -110,7 +109,6 @@ pub fn claims(all: &[Histories]) -> Vec<Claim> {
             "The peaks of the vibration fall from the first transition to the third.",
             falls(Quantity::Vibration),
             texts(Quantity::Vibration),
-            "",
         ),
         of("impact-and-vibration-fall-with-collision").judged(
             "Impact and vibration diminish as the collision does.",
@@ -121,7 +119,6 @@ pub fn claims(all: &[Histories]) -> Vec<Claim> {
                 least_following(all, Quantity::Impact),
                 least_following(all, Quantity::Vibration)
             ),
-            "",
         ),
         of("nothing-after-the-third").judged(
             "After the third transition the values approach zero: contact is smooth.",
@@ -132,15 +129,13 @@ pub fn claims(all: &[Histories]) -> Vec<Claim> {
                  drive's torque ripple, which shakes the arm between the steps as well.",
                 left[0], left[1], left[2]
             ),
-            "",
         ),
         of("collision-before-2-s").judged(
             "The largest collision comes in the first transition, before 2 s.",
             collided.iter().all(|&t| t < FIRST_BEFORE_S) && highest_first(fast, Quantity::Collision),
             format!("At 8 mm/s, 33.3 N: {} s (theory, simulation, virtual rig).", seconds(collided)),
-            "",
         ),
-        of("impact-at-2-s").judged(
+        of("impact-at-2-s").explained(
             "The impact peaks at 2 s, after the collision, held up by the tread's deformation.",
             hit.iter().all(|&t| (AT_2_S.0..=AT_2_S.1).contains(&t))
                 && hit.iter().zip(&collided).all(|(hit, collided)| hit > collided),
@@ -154,7 +149,7 @@ pub fn claims(all: &[Histories]) -> Vec<Claim> {
              stress wave crosses the tread in about 0.1 ms: it cannot hold anything up by tenths of \
              a second.",
         ),
-        of("vibration-peaks-twice").judged(
+        of("vibration-peaks-twice").explained(
             "The vibration peaks before 2 s and again after it.",
             humps.iter().all(|&count| count >= 2),
             format!(
@@ -172,9 +167,8 @@ pub fn claims(all: &[Histories]) -> Vec<Claim> {
             "Within one sleeve and at the same preload, a faster wheel meets a larger collision.",
             faster.iter().all(|(a, b)| first_rises(a, b, Quantity::Collision, 1.0)),
             pairs_text(&faster),
-            "",
         ),
-        of("collision-falls-with-preload-rig").judged(
+        of("collision-falls-with-preload-rig").explained(
             "Within one sleeve and at the same speed, more preload makes for a smaller collision.",
             pressed.iter().all(|(a, b)| first_rises(a, b, Quantity::Collision, -1.0)),
             pairs_text(&pressed),

@@ -2,7 +2,8 @@
 
 use interstage::rig::Rig;
 
-use hil_sim::plant::balance::{Axial, Balance};
+use hil_sim::plant::balance::{Axial, Balance, BalanceError};
+use hil_sim::plant::crossing::{CrossingCase, CrossingResult, cross};
 use hil_sim::plant::ring::RingParameters;
 
 /// How finely a crossing is resolved.
@@ -64,8 +65,14 @@ impl ReferenceCase {
 
     /// Radial load and how the wheel is moved.
     pub fn balance(&self) -> Balance {
-        let (preload_n, axial) = (self.preload_n, self.axial);
-        Balance { preload_n, spring_n_per_mm: 0.0, arm_n: 0.0, axial }
+        Balance::under(self.preload_n, self.axial)
+    }
+
+    /// The crossing of the plant's ring, without inertia.
+    pub fn still(&self) -> Result<CrossingResult, BalanceError> {
+        let Resolution { elements, stride_mm, .. } = self.resolution;
+        let of = (self.speed_mm_s, self.preload_n, self.axial);
+        cross(&CrossingCase::of(&self.rig, (elements, stride_mm), of))
     }
 
     /// Stiffness of the tread at once, per area, Pa/m: k_0.

@@ -9,7 +9,6 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::reference::Resolution;
-use hil_sim::plant::crossing::{CrossingCase, CrossingResult, cross};
 
 /// An elastic wheel and a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -137,19 +136,6 @@ fn coarse(case: ReferenceCase) -> ReferenceCase {
     ReferenceCase { resolution, ..case }
 }
 
-/// The crossing of the plant, without inertia.
-fn still(case: &ReferenceCase) -> CrossingResult {
-    cross(&CrossingCase {
-        ring: case.ring(),
-        step_height_mm: case.rig.rig.step_height_mm,
-        speed_mm_s: case.speed_mm_s,
-        preload_n: case.preload_n,
-        axial: case.axial,
-        stride_mm: case.resolution.stride_mm,
-    })
-    .unwrap()
-}
-
 /// A movement to the centre `(x, y)` on this wall.
 fn at(wall: &Wall, x_mm: f64, y_mm: f64, dt_s: f64) -> Motion {
     Motion { wall: wall.local(x_mm), height_mm: y_mm, turn_rad: 0.0, dt_s }
@@ -163,7 +149,7 @@ fn step() -> Wall {
 fn without_memory_the_ring_is_its_closed_form() {
     for preload in [40.0, 100.0, 150.0] {
         let (case, elastic) = without_memory(5.0, preload);
-        let crossing = still(&case);
+        let crossing = case.still().unwrap();
         let gap = elastic.gap_mm(preload).unwrap();
         assert!((crossing.gap_mm / gap - 1.0).abs() < 5e-5, "{} {gap}", crossing.gap_mm);
         let mut ring = Ring::new(case.ring());
@@ -187,7 +173,7 @@ fn finer_rings_come_closer_to_the_closed_form() {
     let gap = elastic.gap_mm(100.0).unwrap();
     let error = |elements: usize| {
         let resolution = Resolution { elements, stride_mm: 14.4 / elements as f64, step_s: 1e-4 };
-        (still(&ReferenceCase { resolution, ..case.clone() }).gap_mm / gap - 1.0).abs()
+        (ReferenceCase { resolution, ..case.clone() }.still().unwrap().gap_mm / gap - 1.0).abs()
     };
     let (few, more, many) = (error(720), error(1440), error(5760));
     assert!(few < 2e-3 && more < 5e-4 && many < 5e-5, "{few} {more} {many}");
@@ -197,7 +183,7 @@ fn finer_rings_come_closer_to_the_closed_form() {
 fn the_two_resolutions_are_converged() {
     let at = |elements: usize| {
         let resolution = Resolution { elements, stride_mm: 28.8 / elements as f64, step_s: 1e-4 };
-        let crossing = still(&ReferenceCase { resolution, ..ReferenceCase::first() });
+        let crossing = ReferenceCase { resolution, ..ReferenceCase::first() }.still().unwrap();
         [crossing.gap_mm, crossing.corner_force_n]
     };
     let (history, figure, finest) = (at(2880), at(5760), at(11520));
@@ -236,7 +222,7 @@ fn the_tread_closes_on_the_corner_at_millimetres_per_second() {
 fn slow_and_light_the_dynamic_form_is_the_quasi_static_one() {
     let mut case = coarse(ReferenceCase::first());
     case.rig.plant.moved_mass_kg = 1e-3;
-    let (still, moving) = (still(&case), dynamic(&case).unwrap());
+    let (still, moving) = (case.still().unwrap(), dynamic(&case).unwrap());
     let lift = |s: &&Sample| s.t_s > 0.0 && s.floor_n == 0.0;
     let gap = moving.samples.iter().find(lift).unwrap().clearance_mm;
     assert!((still.gap_mm / gap - 1.0).abs() < 3e-3, "{} {gap}", still.gap_mm);
