@@ -131,7 +131,6 @@ fn commission(seed: u64) -> Vec<String> {
     let hidden = hidden(seed);
     let folder = tempfile::tempdir().expect("a folder");
     let folder = folder.path();
-    let folder = if std::env::var("SEED").is_ok() { Path::new("/tmp/com") } else { folder };
     // First power-up.
     let bench = Bench::new(elf(), strings(), &hidden).expect("a bench");
     let mut attended = Attended::new(bench);
@@ -145,7 +144,6 @@ fn commission(seed: u64) -> Vec<String> {
     }
     let mut mine = progress.proposed;
     assert_eq!(mine.sources.len(), 3, "{:?}", mine.sources);
-    let progress_sources = mine.sources.clone();
     // Three deployments.
     let mut at = board(&hidden, None);
     let usual = mine.rig.preload.cruise_n;
@@ -161,7 +159,6 @@ fn commission(seed: u64) -> Vec<String> {
     // Identification.
     let found = identify(&records, &records[0].scenario).expect("identified");
     let mine = found.scenario.clone();
-    eprintln!("DBG {:?} {:#?}", progress_sources, found.parameters);
     let mut wrong = Vec::new();
     let plant = hidden.plant();
     for (name, truth) in [
