@@ -28,8 +28,10 @@ fn options_are_checked_by_name() {
         ("deploy --rig moon", &["--rig", "moon", "prototype"][..]),
         ("deploy --controller clever", &["--controller", "scheduled"]),
         ("deploy --seed x", &["--seed", "'x'"]),
-        ("deploy --seed -1", &["-1"]),
-        ("deploy --seed 18446744073709551615", &["run.seed"]),
+        ("deploy --seed -1", &["--seed", "-1", "a whole number, 0 or more"]),
+        ("deploy --seed 1.5", &["--seed", "1.5", "a whole number, 0 or more"]),
+        ("montecarlo --seed -1", &["--seed", "-1", "a whole number, 0 or more"]),
+        ("deploy --seed 18446744073709551615", &["--seed", "at most 9223372036854775807"]),
         ("deploy --target moon", &["--target <TARGET>", "moon", "sil, board, probe"]),
         ("deploy --sead 1", &["--sead"]),
         ("deploy --out a --no-files", &["--out", "--no-files"]),
@@ -194,13 +196,4 @@ fn a_near_name_is_offered_whatever_the_group() {
         refused(&["deploy", "--set", &format!("run.faults={faults}")], &[wanted]);
     }
     refused(&["faults", "--only", "preload-senser"], &["did you mean \"preload-sensor\"?"]);
-}
-
-#[test]
-fn a_negative_seed_gives_one_clear_error() {
-    for verb in ["deploy", "capture", "montecarlo"] {
-        let arguments = [verb, "--seed", "-1"];
-        refused(&arguments, &["--seed", "-1", "a whole number, 0 or more"]);
-    }
-    refused(&["deploy", "--seed", "1.5"], &["--seed", "1.5", "a whole number, 0 or more"]);
 }
