@@ -121,7 +121,7 @@ const COLUMNS: [Column; 11] = [
     column("fault", "fault", "", 0),
     column("reported", "code", "", 0),
     column("detections", "found", "", 0),
-    column("otherwise", "found\nas else", "", 0),
+    column("otherwise", "other\ncode", "", 0),
     column("tolerated", "tolerated", "", 0),
     column("undetected", "missed", "", 0),
     column("unsafe", "unsafe", "", 0),

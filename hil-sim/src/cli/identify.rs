@@ -140,11 +140,9 @@ fn human(found: &Identification) -> String {
         vec![p.name.clone(), p.unit.to_owned(), figures(p.value, width), interval, p.by.clone()]
     });
     let mut table = plain(&["parameter", "unit", "value", "95 % interval", "identified by"], rows);
-    // A broken key cannot be copied, and a broken interval not be read.
-    for column in [0, 3] {
-        if let Some(column) = table.column_mut(column) {
-            column.set_constraint(ColumnConstraint::ContentWidth);
-        }
+    // A broken key cannot be copied.
+    if let Some(keys) = table.column_mut(0) {
+        keys.set_constraint(ColumnConstraint::ContentWidth);
     }
     let mut text = format!("{} degrees of freedom\n{table}\n", found.degrees_of_freedom);
     let rows = found.residuals.iter().map(|left| {

@@ -110,7 +110,7 @@ mod tests {
     }
 
     #[test]
-    fn a_ledger_line_takes_one_line_of_text() {
+    fn a_ledger_line_and_the_files_of_a_folder_take_one_line_each() {
         let summary = example::deploy().summary;
         let text = run(&summary, &[PathBuf::from("out/run/report.html")], false);
         let c = &summary.crossings[1];
@@ -127,13 +127,8 @@ mod tests {
         assert!(words.iter().any(|words| line.contains(words)), "{line}");
         assert!(!text.contains(" predicted ") && run(&summary, &[], true).contains(" predicted "));
         assert!(text.ends_with("  wrote out/run/report.html\n"));
-    }
-
-    #[test]
-    fn files_of_one_folder_take_one_line() {
         let files = ["report.html", "log.csv"].map(|name| PathBuf::from("out/run").join(name));
-        let text = run(&example::deploy().summary, &files, false);
-        assert!(text.ends_with("  wrote out/run/: report.html, log.csv\n"), "{text}");
+        assert!(run(&summary, &files, false).ends_with("/: report.html, log.csv\n"));
     }
 
     #[test]
