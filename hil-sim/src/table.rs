@@ -1,10 +1,40 @@
-//! Tables of the terminal and their numbers, at most [`WIDTH`] columns wide.
+//! Tables and text of the terminal, at most [`width`] columns wide, and their numbers.
 
 use comfy_table::presets::UTF8_HORIZONTAL_ONLY;
 use comfy_table::{Cell, CellAlignment, ContentArrangement, Table, TableComponent};
 
 /// Most columns that the output takes.
-pub const WIDTH: u16 = 100;
+const WIDTH: u16 = 100;
+/// Columns that every output may take.
+const NARROW: u16 = 80;
+
+/// Columns that the output takes: those of the terminal within 80 to 100, elsewhere 100.
+pub fn width() -> u16 {
+    Table::new().width().map_or(WIDTH, |columns| columns.clamp(NARROW, WIDTH))
+}
+
+/// Whether the terminal is too narrow for every column.
+pub fn is_narrow() -> bool {
+    width() < WIDTH
+}
+
+/// `text` broken at blanks to at most this many columns, each line after `indent`.
+pub fn wrapped(text: &str, indent: &str, columns: u16) -> String {
+    let most = usize::from(columns) - indent.len();
+    let mut lines = vec![String::new()];
+    for word in text.split_whitespace() {
+        let line = lines.last_mut().expect("there is always one");
+        if line.is_empty() {
+            line.push_str(word);
+        } else if line.chars().count() + 1 + word.chars().count() <= most {
+            line.push(' ');
+            line.push_str(word);
+        } else {
+            lines.push(word.to_owned());
+        }
+    }
+    lines.iter().map(|line| format!("{indent}{line}\n")).collect()
+}
 
 /// A table of `head` and `rows` in the style of the others, its first column on the
 /// left and the rest on the right.
@@ -17,7 +47,7 @@ pub fn plain(head: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> Tabl
         .remove_style(TableComponent::LeftBorderIntersections)
         .remove_style(TableComponent::RightBorderIntersections)
         .set_content_arrangement(ContentArrangement::Dynamic)
-        .set_width(WIDTH)
+        .set_width(width())
         .set_header(head.iter().enumerate().map(|(column, text)| cell(column, (*text).to_owned())));
     for row in rows {
         table.add_row(row.into_iter().enumerate().map(|(column, text)| cell(column, text)));

@@ -48,6 +48,13 @@ impl Frame {
         Self { columns: columns.to_vec(), rows: rows.into_iter().map(row).collect() }
     }
 
+    /// Without the columns of these keys if the terminal `is_narrow`.
+    pub fn fitted(&self, spare: &[&str], is_narrow: bool) -> Self {
+        let mut frame = self.clone();
+        frame.columns.retain(|column| !(is_narrow && spare.contains(&&*column.key)));
+        frame
+    }
+
     /// As a table of the terminal.
     pub fn text(&self) -> String {
         let heads: Vec<String> = self.heads("\n").collect();
@@ -72,11 +79,13 @@ impl Frame {
         String::from_utf8(table.into_inner().unwrap_or_default()).unwrap_or_default()
     }
 
-    /// As a page with this title.
-    pub fn html(&self, title: &str) -> String {
+    /// As a page with this headline.
+    pub fn html(&self, headline: &str, good: bool) -> String {
         let heads: Vec<String> = self.heads(", ").map(|head| escape(&head)).collect();
         let rows = self.shown().map(|row| row.iter().map(|cell| escape(cell)).collect());
-        page_of(title, "good", title, &table("ledger", &heads, rows.collect()))
+        let rows = table("ledger pairs rows", &heads, rows.collect());
+        let grade = if good { "good" } else { "bad" };
+        page_of("a campaign", grade, headline, &format!("<section>\n{rows}</section>\n"))
     }
 
     fn heads(&self, between: &'static str) -> impl Iterator<Item = String> {
@@ -116,12 +125,14 @@ mod tests {
             [json!({ "name": "a, <b>", "gap_mm": 1.2345, "ok": true }), json!({ "name": 2 })];
         let frame = Frame::of(&columns, rows);
         assert_eq!(frame.csv(), "name,gap_mm,ok\n\"a, <b>\",1.2345,true\n2,,\n");
+        assert_eq!(frame.fitted(&["gap_mm"], true).csv(), "name,ok\n\"a, <b>\",true\n2,\n");
+        assert_eq!(frame.fitted(&["gap_mm"], false), frame);
         let text = frame.text();
         assert!(
             text.contains("a, <b>") && text.contains("1.23 ") && text.contains("yes"),
             "{text}"
         );
-        let page = frame.html("title");
+        let page = frame.html("5 runs", true);
         for part in ["<th>gap, mm</th>", "<td>a, &lt;b&gt;</td>", "<td>1.23</td>", "<td>-</td>"] {
             assert!(page.contains(part), "{part}: {page}");
         }

@@ -210,18 +210,21 @@ impl<O> Found<O> {
             #[serde(skip_serializing_if = "Option::is_none")]
             campaign: &'a Option<Part>,
         }
+        let (text, good) = (text(), good && self.partial.is_none());
+        let partial = self.partial.as_ref().map_or_else(String::new, |Partial { done, of }| {
+            format!("Partial: {done} of {of} cases ({}) are done\n", self.what)
+        });
         for file in &args.show.table {
             let is_page = file.extension().is_some_and(|ending| ending == "html");
-            let title = format!("{} of a campaign", self.what);
-            write_text(file, &if is_page { rows.html(&title) } else { rows.csv() })?;
+            // A text that begins with a table has no headline.
+            let said = text.lines().next().filter(|line| !line.starts_with('\u{2500}'));
+            let headline = partial.clone() + said.unwrap_or("Rows of a campaign");
+            write_text(file, &if is_page { rows.html(&headline, good) } else { rows.csv() })?;
         }
         let printed = Printed { outcome: printed, partial: self.partial, campaign: &self.part };
         output::result(args.show.json, &printed, || {
-            let partial = self.partial.map(|Partial { done, of }| {
-                format!("Partial: {done} of {of} cases ({}) are done\n", self.what)
-            });
-            partial.unwrap_or_default() + &text() + &output::wrote(&args.show.table)
+            partial + &text + &output::wrote(&args.show.table)
         })?;
-        Ok(Outcome::of(good && self.partial.is_none()))
+        Ok(Outcome::of(good))
     }
 }

@@ -8,6 +8,7 @@ use super::scenario::RunArgs;
 use crate::campaign::{Column, Frame, column};
 use crate::compare::{self, Comparison, Entry, STRATEGIES};
 use crate::oracle::Effort;
+use crate::table::{is_narrow, width, wrapped};
 
 /// Compares four preload strategies on the same random rigs: scheduled, constant at cruise,
 /// constant at the limit, reactive; and the oracle, the best run that the plants allow.
@@ -74,22 +75,28 @@ fn row(entry: &Entry, of: &Comparison) -> Value {
     row
 }
 
+/// What the columns mean.
+const LEGEND: &str = "command: from the accepted command to arrival (moving: in motion), the mean \
+    over completed runs; ratio: over the scheduled strategy's. gap, margin (of friction): the worst \
+    of all runs. short: incomplete runs. mean: mean preload. reserve: how far below the reference \
+    gap the planner aims.";
+/// What the oracle is.
+const ORACLE: &str = "oracle: the fastest run found for each plant, all of it known in advance, \
+    with the same actuators, at the worst gap and slip margin of the scheduled run there";
+
 fn human(comparison: &Comparison, rows: &Frame) -> String {
     let mut text = format!(
-        "{} rigs, each strategy tuned to a worst gap of {:.3} mm\n{}\ncommand: from the accepted \
-         command to arrival; moving: the wheel moves; means over completed runs,\nwith their \
-         ratios to the scheduled strategy. gap, margin (of friction): the worst of all runs.\n\
-         short: incomplete runs. reserve: how far below the reference gap the planner aims.\n",
+        "{} rigs, each strategy tuned to a worst gap of {:.3} mm\n{}",
         comparison.runs,
         comparison.gap_ref_mm,
-        rows.text().trim_end()
+        rows.fitted(&["moving_s", "moving_ratio"], is_narrow()).text()
     );
+    text += &wrapped(LEGEND, "", width());
     for entry in comparison.entries.iter().filter(|entry| !entry.tuned) {
         text += &format!("{}: no reserve brings it to the reference gap\n", entry.controller);
     }
     if comparison.entries.iter().any(|entry| entry.controller == compare::ORACLE) {
-        text += "oracle: the fastest run found for each plant, all of it known in advance, with \
-                 the same actuators,\nat the worst gap and slip margin of the scheduled run there\n";
+        text += &wrapped(ORACLE, "", width());
     }
     for (seed, why) in &comparison.oracle_fails {
         text += &format!("oracle, seed {seed}: no run found, {why}\n");

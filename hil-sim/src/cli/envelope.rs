@@ -125,8 +125,8 @@ fn human(found: &Envelope) -> String {
     );
     for (known, title) in [(true, "known"), (false, "unknown")] {
         text += &format!(
-            "Friction and load {title} to the controller: s scheduled, c constant, l limit, \
-             r reactive\n{}\n",
+            "Friction and load {title} to the controller:\n\
+             s scheduled, c constant, l limit, r reactive\n{}\n",
             letters(found, known)
         );
     }

@@ -14,6 +14,7 @@ use crate::faults::campaign::{
 };
 use crate::progress;
 use crate::scenario::{Scenario, nearest_word};
+use crate::table::is_narrow;
 
 /// Breaks everything that can break, each fault at random instants of random rigs, out and
 /// back, and judges the outcome by the true state of the plant.
@@ -120,7 +121,7 @@ const COLUMNS: [Column; 11] = [
     column("fault", "fault", "", 0),
     column("reported", "code", "", 0),
     column("detections", "found", "", 0),
-    column("otherwise", "found as\nelse", "", 0),
+    column("otherwise", "other\ncode", "", 0),
     column("tolerated", "tolerated", "", 0),
     column("undetected", "missed", "", 0),
     column("unsafe", "unsafe", "", 0),
@@ -144,6 +145,9 @@ fn clean(args: &Args, count: u64) -> Result<Outcome, Failure> {
 
 /// The matrix as a table, with what failed below it.
 fn human(outcome: &Matrix, rows: &Frame) -> String {
+    // JSON and CSV have every column.
+    let rows = rows.fitted(&["latency_median_ms"], true);
+    let rows = rows.fitted(&["worst_preload_n", "worst_motion_mm"], is_narrow());
     let mut text = format!(
         "{} faults at {} instants each: {} found as something else, {} undetected, {} unsafe\n{}",
         outcome.matrix.len(),

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::builder::PossibleValuesParser;
+use comfy_table::ColumnConstraint;
 
 use super::failure::{Failure, Outcome};
 use super::output::{self, WithFiles};
@@ -12,7 +13,7 @@ use crate::identify::published::{self, CONVERGED, Tread};
 use crate::identify::record::Record;
 use crate::identify::result::{Identification, Parameter, Residuals, identify};
 use crate::scenario::{PRESETS, Scenario};
-use crate::table::{number, plain};
+use crate::table::{number, plain, width, wrapped};
 use crate::{files, progress};
 
 /// Identifies a rig's parameters from its logs, with 95 % intervals.
@@ -138,7 +139,11 @@ fn human(found: &Identification) -> String {
         let interval = format!("{} to {}", end(p.low), end(p.high));
         vec![p.name.clone(), p.unit.to_owned(), figures(p.value, width), interval, p.by.clone()]
     });
-    let table = plain(&["parameter", "unit", "value", "95 % interval", "identified by"], rows);
+    let mut table = plain(&["parameter", "unit", "value", "95 % interval", "identified by"], rows);
+    // A broken key cannot be copied.
+    if let Some(keys) = table.column_mut(0) {
+        keys.set_constraint(ColumnConstraint::ContentWidth);
+    }
     let mut text = format!("{} degrees of freedom\n{table}\n", found.degrees_of_freedom);
     let rows = found.residuals.iter().map(|left| {
         vec![
@@ -151,7 +156,7 @@ fn human(found: &Identification) -> String {
     });
     text += &format!("{}\n", plain(&["residuals", "unit", "rms", "values", "independent"], rows));
     for note in &found.notes {
-        text += &format!("  {note}\n");
+        text += &wrapped(note, "  ", width());
     }
     text
 }

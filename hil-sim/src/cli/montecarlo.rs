@@ -8,7 +8,7 @@ use super::scenario::RunArgs;
 use crate::campaign::{Column, Frame, column};
 use crate::montecarlo::{self, Least, RunLine};
 use crate::scenario::{MismatchDraw, Scenario};
-use crate::table::{number, plain};
+use crate::table::{number, plain, width, wrapped};
 
 /// Runs many random rigs, each drawn from its own seed, and shows what limits them.
 ///
@@ -121,7 +121,8 @@ fn human(outcome: &montecarlo::Outcome) -> String {
     text += "What limits it\n";
     for limit in &outcome.limits {
         let (runs, all) = (limit.runs, outcome.runs);
-        text += &format!("  limit {} in {runs} of {all} runs: {}\n", limit.code, limit.text);
+        let limit = format!("limit {} in {runs} of {all} runs: {}", limit.code, limit.text);
+        text += &wrapped(&limit, "  ", width());
     }
     if outcome.limits.is_empty() {
         text += "  no limit was met\n";

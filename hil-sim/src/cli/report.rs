@@ -135,7 +135,9 @@ fn two(args: &Args, (log, boots): (&Path, &[Recording]), path: &Path) -> Result<
     });
     let is_complete = missing.concat().is_empty();
     output::result(args.json, &printed, || {
-        human(&differences) + &missing.concat() + &output::wrote(&files)
+        let runs = [('A', &names.0, first), ('B', &names.1, second)];
+        let runs = runs.map(|(letter, log, run)| terminal::one_of_two(letter, log, &run.summary));
+        runs.concat() + &human(&differences) + &missing.concat() + &output::wrote(&files)
     })?;
     Ok(Outcome::of(is_complete))
 }

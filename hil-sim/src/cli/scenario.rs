@@ -94,7 +94,8 @@ pub(super) fn remind(what: &str, scenario: &Scenario) {
 
 /// Reads a seed.
 pub(super) fn seed(text: &str) -> Result<u64, &'static str> {
-    text.parse().map_err(|_| "expected a whole number, 0 or more")
+    let seed = text.parse().ok().filter(|seed| *seed <= i64::MAX as u64);
+    seed.ok_or("expected a whole number, 0 or more, at most 9223372036854775807")
 }
 
 impl RunArgs {

@@ -8,6 +8,7 @@ use super::failure::{Failure, Outcome};
 use super::scenario::seed;
 use crate::campaign::{Column, Frame, column};
 use crate::stress::{self, StressReport, Worst};
+use crate::table::{is_narrow, width, wrapped};
 
 /// The plant at the ends of every range.
 ///
@@ -69,9 +70,11 @@ const COLUMNS: [Column; 9] = [
 ];
 
 fn human(report: &StressReport, rows: &Frame) -> String {
-    let mut text = format!("{} cases of the plant\n{}", report.cases, rows.text());
+    let rows = rows.fitted(&["tau_s"], is_narrow()).text();
+    let mut text = format!("{} cases of the plant\n{rows}", report.cases);
     for (name, refused) in &report.refused {
-        text += &format!("  refused {}: {name}, as: {}\n", refused.count, refused.example);
+        let refused = format!("refused {}: {name}, as: {}", refused.count, refused.example);
+        text += &wrapped(&refused, "  ", width());
     }
     for failure in &report.failed {
         text += &format!("  failed: {}: {:?}\n", failure.why, failure.case);

@@ -9,7 +9,7 @@ use super::output::wrote;
 use crate::record::{CrossingLine, Report, Summary};
 use crate::report::verdict::{Grade, gap_sentence, headline, origin, slip_sentence, verdict};
 use crate::report::{COLUMNS, slowed_by};
-use crate::table::{number, plain};
+use crate::table::{number, plain, wrapped};
 
 /// Most columns of a run's text, and of its table with every column.
 const WIDTH: u16 = 80;
@@ -18,26 +18,35 @@ const WIDE: u16 = 160;
 /// The run of `summary` as text, with the paths of `files` at the end; `all` columns of the
 /// crossings or those that matter most. Ends with a line feed.
 pub fn run(summary: &Summary, files: &[PathBuf], all: bool) -> String {
-    let mut text = painted(&wrapped(&headline(summary), ""), Grade::of(summary), is_coloured());
+    let mut text =
+        painted(&wrapped(&headline(summary), "", WIDTH), Grade::of(summary), is_coloured());
     for missing in &summary.missing {
-        text += &wrapped(&format!("incomplete log: {missing}"), "  ");
+        text += &wrapped(&format!("incomplete log: {missing}"), "  ", WIDTH);
     }
-    text += &wrapped(&details(summary), "  ");
+    text += &wrapped(&details(summary), "  ", WIDTH);
     if !summary.crossings.is_empty() {
         text += &format!("{}\n", ledger(&summary.crossings, all));
     }
     if let Some(lost) = &summary.lost {
-        text += &wrapped(&lost.sentence(), "  ");
+        text += &wrapped(&lost.sentence(), "  ", WIDTH);
     }
     for fault in &summary.injected {
-        text += &wrapped(&format!("injected: {fault}"), "  ");
+        text += &wrapped(&format!("injected: {fault}"), "  ", WIDTH);
     }
     for (kind, reports) in [("fault", &summary.faults), ("limit", &summary.limits)] {
         for report in reports {
-            text += &wrapped(&report_line(kind, report), "  ");
+            text += &wrapped(&report_line(kind, report, summary.commanded_s), "  ", WIDTH);
         }
     }
     text + &wrote(files)
+}
+
+/// One of two runs that are compared, by its letter and its log: outcome, verdict and origin.
+pub fn one_of_two(letter: char, log: &str, summary: &Summary) -> String {
+    let headline = wrapped(&format!("{letter}: {}", headline(summary)), "", WIDTH);
+    let parts = [verdict(summary), gap_sentence(summary), origin(summary), log.to_owned()];
+    let parts: Vec<String> = parts.into_iter().filter(|part| !part.is_empty()).collect();
+    painted(&headline, Grade::of(summary), is_coloured()) + &wrapped(&parts.join("; "), "  ", WIDTH)
 }
 
 /// Whether standard output shows colours: a terminal, unless `NO_COLOR` is set.
@@ -79,26 +88,10 @@ fn ledger(crossings: &[CrossingLine], all: bool) -> Table {
     table
 }
 
-fn report_line(kind: &str, report: &Report) -> String {
-    format!("{kind} {} at {:.3} s: {}", report.code, report.t_s, report.text)
-}
-
-/// `text` broken at blanks to the width, each line after `indent`.
-fn wrapped(text: &str, indent: &str) -> String {
-    let most = usize::from(WIDTH) - indent.len();
-    let mut lines = vec![String::new()];
-    for word in text.split_whitespace() {
-        let line = lines.last_mut().expect("there is always one");
-        if line.is_empty() {
-            line.push_str(word);
-        } else if line.chars().count() + 1 + word.chars().count() <= most {
-            line.push(' ');
-            line.push_str(word);
-        } else {
-            lines.push(word.to_owned());
-        }
-    }
-    lines.iter().map(|line| format!("{indent}{line}\n")).collect()
+/// A fault or a limit, its time from the command as on the page; from the start without one.
+fn report_line(kind: &str, report: &Report, commanded_s: Option<f64>) -> String {
+    let at_s = report.t_s - commanded_s.unwrap_or(0.0);
+    format!("{kind} {} at {} s: {}", report.code, number(at_s, 3), report.text)
 }
 
 #[cfg(test)]
@@ -117,7 +110,7 @@ mod tests {
     }
 
     #[test]
-    fn a_ledger_line_takes_one_line_of_text() {
+    fn a_ledger_line_and_the_files_of_a_folder_take_one_line_each() {
         let summary = example::deploy().summary;
         let text = run(&summary, &[PathBuf::from("out/run/report.html")], false);
         let c = &summary.crossings[1];
@@ -134,13 +127,8 @@ mod tests {
         assert!(words.iter().any(|words| line.contains(words)), "{line}");
         assert!(!text.contains(" predicted ") && run(&summary, &[], true).contains(" predicted "));
         assert!(text.ends_with("  wrote out/run/report.html\n"));
-    }
-
-    #[test]
-    fn files_of_one_folder_take_one_line() {
         let files = ["report.html", "log.csv"].map(|name| PathBuf::from("out/run").join(name));
-        let text = run(&example::deploy().summary, &files, false);
-        assert!(text.ends_with("  wrote out/run/: report.html, log.csv\n"), "{text}");
+        assert!(run(&summary, &files, false).ends_with("/: report.html, log.csv\n"));
     }
 
     #[test]
@@ -153,9 +141,11 @@ mod tests {
 
     #[test]
     fn faults_and_limits_are_listed() {
-        let text = run(&example::faulted().summary, &[], false);
+        let summary = example::faulted().summary;
+        let text = run(&summary, &[], false);
         assert!(text.starts_with("Did not complete: fault 121"));
-        assert!(text.contains("  fault 121 at "));
+        let from_command_s = summary.faults[0].t_s - summary.commanded_s.expect("a command");
+        assert!(text.contains(&format!("  fault 121 at {from_command_s:.3} s: ")), "{text}");
         assert!(text.contains("  limit 201 at "));
     }
 }

@@ -10,6 +10,7 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::{Axis, Block, Chart, Dataset, GraphType};
 
 use crate::record::Controller;
+use crate::table::label;
 
 /// Time span of the plots, s.
 pub(super) const SPAN_S: f64 = 10.0;
@@ -121,7 +122,7 @@ impl Plot {
         if area.height >= WITH_TIMES {
             across = across.labels([begin_s, end_s].map(|at| format!("{at:.1} s")));
         }
-        let labels = [low, 0.5 * (low + high), high].map(|value| format!("{value:.digits$}"));
+        let labels = [low, 0.5 * (low + high), high].map(|value| label(value, digits));
         let chart = Chart::new(sets.collect())
             .legend_position(None)
             .block(Block::bordered().title(self.title()))

@@ -3,6 +3,7 @@
 use std::time::Instant;
 
 use super::{Controller, Counts, Item, Mark, mode_words, stage_name, text};
+use crate::table::number;
 
 /// The latest items of a log, and its rates.
 pub struct View {
@@ -82,16 +83,19 @@ impl View {
                 row.t_s, row.level
             );
             let motion = format!(
-                " position {:6.2} mm   speed {:5.2} of {:5.2} mm/s   preload {:5.1} of {:5.1} N\n",
-                row.position_mm,
-                row.wheel_speed_mm_s,
-                row.speed_ref_mm_s,
-                row.preload_n,
-                row.preload_ref_n
+                " position {:>6} mm   speed {:>5} of {:>5} mm/s   preload {:>5} of {:>5} N\n",
+                number(row.position_mm, 2),
+                number(row.wheel_speed_mm_s, 2),
+                number(row.speed_ref_mm_s, 2),
+                number(row.preload_n, 1),
+                number(row.preload_ref_n, 1)
             );
             let contact = format!(
-                " compression {:4.2} mm  radius {:5.1} mm  gap predicted {:4.2} mm  slip margin {:5.2}",
-                row.compression_mm, row.radius_mm, row.gap_predicted_mm, row.slip_margin
+                " compression {:>4} mm  radius {:>5} mm  gap predicted {:>4} mm  slip margin {:>5}",
+                number(row.compression_mm, 2),
+                number(row.radius_mm, 1),
+                number(row.gap_predicted_mm, 2),
+                number(row.slip_margin, 2)
             );
             state + &motion + &contact
         })

@@ -1,7 +1,7 @@
 //! The page around the plots.
 
 use super::panel::Panel;
-use super::panels::{Across, View, figure, motion};
+use super::panels::{Across, View, figure};
 use super::scene::Scene;
 use super::svg::escape;
 use super::verdict::{Grade, gap_sentence, headline, origin, slip_sentence, verdict};
@@ -49,7 +49,9 @@ pub fn html(recording: &Recording, more: &[Section]) -> String {
         &format!(
             "{}<p class=\"note\">The gap of a crossing is the clearance between the step root \
 and the undeformed wheel at the instant at which the lower wall stops carrying load (on retraction: \
- begins to). {} Lead: how long before the corner touched the preload was reached.</p>\n",
+ begins to). {} Lead: how long before the corner touched the preload was reached; negative: how long \
+after that it was missing. Slowed by: what keeps the crossing from being faster; by a slow preload \
+if more of it would take longer to build than it saves.</p>\n",
             tables::ledger(&s.crossings),
             if s.measured {
                 "This log is a controller's: every figure is measured or estimated by it, and where \
@@ -91,7 +93,9 @@ pub fn log_html(boots: &[Recording]) -> String {
     let one = |(n, boot): (usize, &Recording)| {
         let boot = &boot.since_command();
         let s = &boot.summary;
-        let cause = s.restart.as_ref().map_or_else(String::new, |cause| {
+        // The headline of a run that it cut short says it.
+        let cause = s.restart.as_ref().filter(|cause| !headline(s).contains(*cause));
+        let cause = cause.map_or_else(String::new, |cause| {
             format!("<p class=\"remark\">Ended by a restart: {}</p>\n", escape(cause))
         });
         let lost =
@@ -171,14 +175,16 @@ fn plots(recording: &Recording) -> String {
     let time = stack(recording, Across::Time);
     let position = stack(recording, Across::Position);
     let hidden_s = Across::Time.range(&recording.rows).0;
-    let from = motion(&recording.rows).filter(|_| hidden_s > recording.rows[0].controller.t_s);
-    let from = from.map_or_else(String::new, |row| {
+    let s = &recording.summary;
+    let from = s.duration_s.filter(|_| hidden_s > recording.rows[0].controller.t_s);
+    let from = from.map_or_else(String::new, |duration_s| {
         format!(
-            " The wheel moves from {:.2} s; the first {hidden_s:.2} s, at rest, are in the log's tables only.",
-            row.controller.t_s
+            " The preload carries the wheel from {:.2} s; before {hidden_s:.2} s the run, at rest, \
+is in the log's tables only.",
+            duration_s - s.moving_s
         )
     });
-    let commanded = recording.summary.commanded_s.is_some();
+    let commanded = s.commanded_s.is_some();
     let zero = if commanded { "the command" } else { "the start of the controller" };
     format!(
         "<input type=\"radio\" name=\"across\" id=\"time\" checked>\

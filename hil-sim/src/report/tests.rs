@@ -84,6 +84,8 @@ fn the_times_of_a_page_count_from_the_command() {
     assert!((first.1.t_s - first.0.t_s - commanded_s).abs() < 1e-9);
     let page = html(&recording, &[]);
     assert!(page.contains("Time counts from the command."), "{page}");
+    let carried = since.summary.duration_s.expect("a duration") - since.summary.moving_s;
+    assert!(page.contains(&format!(" carries the wheel from {carried:.2} s")), "{page}");
     let fault = recording.summary.faults[0].t_s - commanded_s;
     assert!(page.contains(&format!("{fault:.3} s")) && !page.contains("-0.0,"), "no negative zero");
 }

@@ -92,7 +92,9 @@ pub(crate) fn gap_excess(summary: &Summary) -> Option<f64> {
 
 /// Slip and its name, as half a sentence.
 pub(crate) fn slip_sentence(summary: &Summary) -> String {
-    format!("{} {} mm", slip_name(summary), number(summary.slip_mm, 3))
+    let slip_mm = Some(summary.slip_mm).filter(|slip_mm| slip_mm.is_finite());
+    let slip = slip_mm.map_or("unknown".to_owned(), |mm| format!("{} mm", number(mm, 3)));
+    format!("{} {slip}", slip_name(summary))
 }
 
 pub(crate) fn slip_name(summary: &Summary) -> &'static str {

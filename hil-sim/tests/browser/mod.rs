@@ -213,7 +213,8 @@ fn every_page_fits_a_phone_a_zoomed_window_and_a_dark_room() {
     run(0, at, &["capture", "--out", "c"]);
     run(0, at, &["report", "c/log.mcap", "--out", "captured.html"]);
     run(0, at, &["report", "a/log.mcap", "b/log.mcap", "--out", "both.html"]);
-    for page in ["a/report.html", "b/report.html", "captured.html", "both.html"] {
+    run(0, at, &["montecarlo", "-n", "5", "--table", "runs.html"]);
+    for page in ["a/report.html", "b/report.html", "captured.html", "both.html", "runs.html"] {
         for (width, scale) in [(1400, 1.0), (700, 2.0), (400, 1.0)] {
             browser.open(&at.join(page), width);
             browser.resize(width, scale);

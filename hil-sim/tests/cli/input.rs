@@ -35,7 +35,7 @@ fn options_are_checked_by_name() {
         ("capture --seed -1", &["--seed", "-1", "a whole number, 0 or more"]),
         ("montecarlo --seed -1", &["--seed", "-1", "a whole number, 0 or more"]),
         ("deploy --seed 1.5", &["--seed", "1.5", "a whole number, 0 or more"]),
-        ("deploy --seed 18446744073709551615", &["run.seed"]),
+        ("deploy --seed 18446744073709551615", &["--seed", "at most 9223372036854775807"]),
         ("deploy --target moon", &["--target <TARGET>", "moon", "sil, board, probe"]),
         ("deploy --sead 1", &["--sead"]),
         ("deploy --out a --no-files", &["--out", "--no-files"]),

@@ -92,6 +92,10 @@ fn a_log_has_its_report_and_two_logs_their_comparison() {
     assert_eq!(object(&a)["crossings"], summary["crossings"]);
     let page = |name: &str| std::fs::read_to_string(directory.path().join(name)).expect("a page");
     assert_eq!(page("page.html"), page("a/report.html"), "the page of the deployment itself");
+    let shown = rig_in(directory.path(), &["report", "a/log.mcap", "b/log.mcap"]);
+    assert!(
+        stdout(&shown).starts_with("A: Deployed ") && stdout(&shown).contains("\nB: Deployed ")
+    );
     let both = rig_in(directory.path(), &["report", "a/log.mcap", "b/log.mcap", "--json"]);
     let differences = object(&both)["differences"].as_array().expect("a list").clone();
     let gap = differences.iter().find(|d| d["index"] == 2 && d["quantity"] == "gap").expect("gap");
@@ -124,7 +128,8 @@ fn a_log_with_resets_is_shown_start_by_start() {
     }
     let page = std::fs::read_to_string(at.join("log.html")).expect("a page");
     assert!(page.contains("10 starts of the controller"));
-    assert_eq!(page.matches("Ended by a restart: ").count(), 9);
+    let said = ["Restarted after ", "Ended by a restart: "].map(|text| page.matches(text).count());
+    assert!(said[0] + said[1] == 9 && !page.contains(" - mm"), "{said:?}");
     assert!(page.contains("<h2>Start 10 of 10</h2>"));
     // The cause is the target's own word.
     let cause = starts[0]["restart"].as_str().expect("a cause");

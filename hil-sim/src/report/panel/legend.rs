@@ -20,6 +20,9 @@ impl Panel {
         let lines = lines.map(|line| sample(&*line.name, line.look, true));
         let levels = self.levels.iter().filter(|level| (y.0..=y.1).contains(&level.2));
         let levels = levels.map(|&(name, look, _)| sample(name, look, false));
+        let mut levels: Vec<_> = levels.collect();
+        // The two ends of a band have one sample.
+        levels.dedup_by_key(|level| level.name);
         let bands = self.bands.iter().map(|&(name, _)| sample(name, Look::Truth, true));
         let marks = self.marks.iter().filter(|marks| marks.points.iter().any(is_inside));
         let marks = marks.map(|marks| Sample {
