@@ -271,7 +271,8 @@ impl Doing<'_, '_> {
                 entry = now;
             }
         }
-        Ok((self.reset()? && false, "the preload does not come to rest".to_owned()))
+        self.reset()?;
+        Ok((false, "the preload does not come to rest".to_owned()))
     }
 
     fn zero(&mut self) -> Ended {

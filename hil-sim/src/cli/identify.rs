@@ -11,7 +11,7 @@ use crate::identify::IdentifyError;
 use crate::identify::plot;
 use crate::identify::published::{self, CONVERGED, Tread};
 use crate::identify::record::Record;
-use crate::identify::result::{Identification, Parameter, Residuals, identify};
+use crate::identify::result::{Identification, Parameter, Residuals, figures, identify};
 use crate::scenario::{PRESETS, Scenario};
 use crate::table::{number, plain, width, wrapped};
 use crate::{files, progress};
@@ -119,25 +119,10 @@ fn write(
     Ok(files)
 }
 
-/// As many decimals as the interval's width asks for; of large numbers five digits.
-fn figures(value: f64, width: f64) -> String {
-    if value.abs() >= 1e6 {
-        return format!("{value:.4e}");
-    }
-    let decimals = if width > 0.0 && width.is_finite() {
-        (1.0 - width.log10().floor()).clamp(0.0, 6.0) as usize
-    } else {
-        4
-    };
-    format!("{value:.decimals$}")
-}
-
 fn human(found: &Identification) -> String {
     let rows = found.parameters.iter().map(|p| {
         let width = p.high.zip(p.low).map_or(0.0, |(high, low)| high - low);
-        let end = |end: Option<f64>| end.map_or("-".to_owned(), |end| figures(end, width));
-        let interval = format!("{} to {}", end(p.low), end(p.high));
-        vec![p.name.clone(), p.unit.to_owned(), figures(p.value, width), interval, p.by.clone()]
+        vec![p.name.clone(), p.unit.to_owned(), figures(p.value, width), p.interval(), p.by.clone()]
     });
     let mut table = plain(&["parameter", "unit", "value", "95 % interval", "identified by"], rows);
     // A broken key cannot be copied.

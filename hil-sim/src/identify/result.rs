@@ -1,6 +1,7 @@
 //! The result of identification: each parameter with its interval and its evidence, the
 //! residuals, and the scenario with the new values.
 
+use std::collections::BTreeMap;
 use std::f64::consts::TAU as TURN;
 
 use serde::Serialize;
@@ -59,6 +60,13 @@ impl Parameter {
     ) -> Self {
         let (low, high) = interval.map(|[low, high]| (low, high)).unzip();
         Self { name: name.to_owned(), unit, value, low, high, identified, by: by.to_owned() }
+    }
+
+    /// Its interval in words.
+    pub fn interval(&self) -> String {
+        let width = self.high.zip(self.low).map_or(0.0, |(high, low)| high - low);
+        let end = |end: Option<f64>| end.map_or("-".to_owned(), |end| figures(end, width));
+        format!("{} to {}", end(self.low), end(self.high))
     }
 }
 
@@ -158,8 +166,9 @@ pub(super) fn fitted(
     let is_complete = missing.is_empty();
     let compared = contact.residuals.iter().flatten().chain(&actuator.residuals).map(Vec::len);
     let fitted = contact.x.len() + actuator.x.len();
+    let logs: Vec<&str> = records.iter().map(|record| &*record.name).collect();
     let found = Identification {
-        scenario: updated(scenario, &parameters),
+        scenario: updated(scenario, &parameters, &logs.join(", ")),
         residuals: report.residuals(&actuator),
         degrees_of_freedom: compared.sum::<usize>().saturating_sub(fitted),
         notes: [missing, report.notes(&parameters)].concat(),
@@ -326,25 +335,32 @@ impl Document<'_> {
     }
 }
 
-/// The scenario with what was identified in it.
-fn updated(scenario: &Scenario, parameters: &[Parameter]) -> Scenario {
+/// The scenario with what was identified in it, and from which logs.
+fn updated(scenario: &Scenario, parameters: &[Parameter], logs: &str) -> Scenario {
     let mut table = Table::try_from(scenario).expect("a scenario is always TOML");
-    let mut heights = Vec::new();
-    for Parameter { name, value, .. } in parameters.iter().filter(|p| p.identified) {
-        if name.starts_with("rig.step_height_mm") {
-            heights.push(value);
+    let (mut heights, mut intervals) = (Vec::new(), BTreeMap::<&str, Vec<String>>::new());
+    for of in parameters.iter().filter(|of| of.identified) {
+        if of.name.starts_with("rig.step_height_mm") {
+            heights.push(of.value);
         }
-        if let Some(place) = place_of(&mut table, name) {
-            *place = (*value).into();
+        if let Some(place) = place_of(&mut table, &of.name) {
+            *place = of.value.into();
+            let key = of.name.split('[').next().unwrap_or_default();
+            intervals.entry(key).or_default().push(of.interval());
         }
     }
-    let mut scenario: Scenario = table.try_into().expect("numbers replace numbers");
+    let mut found: Scenario = table.try_into().expect("numbers replace numbers");
     // A scenario has one height for all steps.
     if !heights.is_empty() {
-        scenario.rig.rig.step_height_mm =
-            heights.iter().copied().sum::<f64>() / heights.len() as f64;
+        found.rig.rig.step_height_mm = heights.iter().sum::<f64>() / heights.len() as f64;
     }
-    scenario
+    found.sources.clone_from(&scenario.sources);
+    found.sources.extend(
+        intervals
+            .into_iter()
+            .map(|(key, all)| (key.to_owned(), format!("{}, 95 %, by {logs}", all.join("; ")))),
+    );
+    found
 }
 
 /// Where a scenario has the value of this parameter; none for what is no key. All steps have one
@@ -365,22 +381,25 @@ impl Identification {
         self.parameters.iter().find(|parameter| parameter.name == name)
     }
 
-    /// The scenario file: the identified values, with their intervals in a comment above.
+    /// The scenario file, which has the source of each identified value.
     pub fn to_toml(&self) -> String {
-        let mut logs: Vec<&str> = self.residuals.iter().map(|left| &*left.log).collect();
-        logs.dedup();
-        let logs = logs.join(", ");
-        let logs = if logs.is_empty() { "logs" } else { &*logs };
-        let mut text = format!("# Identified from {logs}; 95 % intervals:\n");
-        for p in self.parameters.iter().filter(|p| p.identified) {
-            if let (Some(low), Some(high)) = (p.low, p.high) {
-                text += &format!("#   {} = {} ({low} to {high}) {}\n", p.name, p.value, p.unit);
-            }
-        }
-        text +=
-            "# One height is that of all steps; sensors' zeros are taken again at each start.\n";
-        text + "\n" + &self.scenario.to_toml()
+        "# One height is that of all steps; sensors' zeros are taken again at each start.\n"
+            .to_owned()
+            + &self.scenario.to_toml()
     }
+}
+
+/// As many decimals as the interval's width asks for; of large numbers five digits.
+pub fn figures(value: f64, width: f64) -> String {
+    if value.abs() >= 1e6 {
+        return format!("{value:.4e}");
+    }
+    let decimals = if width > 0.0 && width.is_finite() {
+        (1.0 - width.log10().floor()).clamp(0.0, 6.0) as usize
+    } else {
+        4
+    };
+    format!("{value:.decimals$}")
 }
 
 #[cfg(test)]
@@ -402,7 +421,7 @@ mod tests {
             parameter("rig.step_height_mm[2]", 4.0, true),
             parameter("preload sensor zero", 3.0, true),
         ];
-        let after = updated(&before, &parameters);
+        let after = updated(&before, &parameters, "a log");
         assert_eq!(after.rig.tread.tau_s, 0.2);
         assert_eq!(after.rig.plant.mu, before.rig.plant.mu);
         assert_eq!(after.rig.rig.step_positions_mm[1], 40.25);
@@ -418,6 +437,7 @@ mod tests {
         };
         let read = Scenario::parse("identified.toml", &found.to_toml(), &[]).unwrap();
         assert_eq!(read, after);
-        assert!(found.to_toml().contains("tread.tau_s = 0.2 (0.1 to 0.3"));
+        assert_eq!(read.sources["tread.tau_s"], "0.10 to 0.30, 95 %, by a log");
+        assert!(!read.assumed().contains(&"tread.tau_s".to_owned()) && read.assumed().len() > 9);
     }
 }
