@@ -226,7 +226,7 @@ impl Estimator {
         let Some(open) = state.crossing.as_mut().filter(|_| on_corner) else { return };
         let from = *open.from.get_or_insert(tick.sensed.travel);
         let turned = tick.sensed.travel.saturating_sub(from).saturating_abs();
-        let hopeless = tick.most_pressed && open.slip.is_slipping();
+        let hopeless = tick.most_pressed && open.slip.goes_on();
         let since = *open.hopeless_since.get_or_insert(tick.now);
         if !hopeless {
             open.hopeless_since = None;
@@ -257,17 +257,23 @@ impl Estimator {
         let seen = self.watch_input(state, sensed);
         let Some(ahead) = self.watch.to_face(&state.watch, state.direction, &seen) else { return };
         let position = position_of_radius(state, sensed);
+        let rise = self.watch.rise(&state.watch, state.direction, &seen);
+        let fall = match state.direction {
+            Direction::Deploy => self.steps.height() - rise,
+            Direction::Retract => rise,
+        } + seen.compression;
+        let lag = (sensed.speed.value * FILTER_LAG).widen();
+        let travel = sensed.travel.saturating_sub(lag);
+        let at = OnEdge { travel, position, fall, depth: seen.compression };
+        let on_floor = state.watch.contact == Contact::Both;
         // Of a crossing that began in its middle the wall below was not measured.
         let told = |open: &&mut OpenCrossing| !open.turned && ahead.abs() > self.telling;
         let Some(open) = state.crossing.as_mut().filter(told) else { return };
+        let radius = self.watch.radius();
         let lost = match state.direction {
-            Direction::Deploy => open.slip.step(sensed.travel, position + ahead),
+            Direction::Deploy => open.slip.step(radius, &at, on_floor),
             Direction::Retract => {
-                let fall = self.watch.rise(&state.watch, state.direction, &seen) + seen.compression;
-                let lag = (sensed.speed.value * FILTER_LAG).widen();
-                let travel = sensed.travel.saturating_sub(lag);
-                let at = OnEdge { travel, position, fall, depth: seen.compression };
-                let Some(landing) = open.slide.step(self.watch.radius(), &at) else { return };
+                let Some(landing) = open.slide.step(radius, &at) else { return };
                 open.landing = Some(landing);
                 open.slip.lost += landing.slid;
                 landing.lost

@@ -32,7 +32,7 @@ const ROLLS: Ratio = q16(3_000_000);
 /// Part of a slide by which it goes on while the edge hands the load over to the wall, likewise.
 const GOES_ON: Ratio = q16(600_000);
 
-/// A retracting wheel on the edge.
+/// A wheel on the edge.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OnEdge {
     /// Travel of the tread when the arm was there.
@@ -43,6 +43,14 @@ pub struct OnEdge {
     pub fall: Millimetres,
     /// Compression, mm.
     pub depth: Millimetres,
+}
+
+impl OnEdge {
+    /// Axial distance from the centre of a wheel of this radius to the face, mm.
+    pub(super) fn ahead(&self, radius: Millimetres) -> Millimetres {
+        let (over, reach) = (radius - self.fall, radius - self.depth);
+        sqrt((reach * reach - over * over).max(Q16::ZERO))
+    }
 }
 
 /// A retracting wheel as the lower wall took it.

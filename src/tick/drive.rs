@@ -101,14 +101,15 @@ impl Controller {
         {
             targets.speed = targets.speed.min(speed.max(self.least_speed));
         }
-        // A wheel that slips grips by more preload alone.
+        // A wheel that slips grips by more preload alone; deploying, it waits for that.
         let (slipping, slipped) = state.estimate.slips();
         if slipped {
             targets.preload = most_preload;
             targets.speed = targets.speed.min(cross_speed);
         }
         self.learn_slip(state, tick);
-        if slipping {
+        let missing = most_preload - tick.sensed.preload_filtered > self.schedule.reached_within();
+        if slipping || slipped && missing && direction == Direction::Deploy {
             targets.speed = targets.speed.min(self.least_speed);
         }
         self.note_preload(state, tick, cross_preload, &targets);
@@ -126,8 +127,12 @@ impl Controller {
         let grows = lost > state.planning.lost;
         state.planning.lost = lost;
         if grows && state.estimate.direction == Direction::Deploy {
+            let unknown = state.planning.slipped.is_none();
             state.planning.slipped = state.planning.slipped.max(Some(tick.pressed()));
-            self.ask(state, tick);
+            // A plan on its way that knows of it comes first.
+            if unknown || state.planning.asked == 0 {
+                self.ask(state, tick);
+            }
         }
     }
 

@@ -61,9 +61,9 @@ fn what_was_wrong_in_silence_is_reported() {
 /// On a sensor of the mean compression a corner that begins to carry looks half like a slip.
 #[test]
 fn a_wheel_that_grips_is_not_said_to_slip() {
-    for seed in ["30084", "30160"] {
-        let set = format!("run.seed={seed}");
-        let summary = ran(&[&set, "run.mismatch=wide"], Direction::Deploy);
+    for (seed, drawn) in [(30_084, "wide"), (30_160, "wide"), (1_530_805, "adversarial")] {
+        let sets = [format!("run.seed={seed}"), format!("run.mismatch={drawn}")];
+        let summary = ran(&[&sets[0], &sets[1]], Direction::Deploy);
         assert!(summary.completed && summary.slip_mm == 0.0, "{seed} {:?}", summary.faults);
         let slips = summary.limits.iter().any(|l| l.code == Limit::WheelSlipped.code());
         assert!(!slips, "{seed}");
@@ -75,7 +75,7 @@ fn an_unknown_friction_is_no_secret() {
     let (parts, seeds): (Vec<u32>, Vec<u64>) = if long() {
         ((64..=87).collect(), (200_001..=200_020).collect())
     } else {
-        (vec![66, 72, 78], vec![0])
+        (vec![66, 70, 72, 78], vec![0, 1_427_008, 1_427_709])
     };
     for direction in DIRECTIONS {
         for part in &parts {
