@@ -45,8 +45,9 @@ impl SourceArgs {
             "sil" => act(&mut Virtual::new(&scenario, attended)?, &scenario),
             "board" => Err(Failure::Elsewhere(Extra::Board)),
             _ => {
+                let port = super::probe::reconnecting()?;
                 remind("the rig at the probe", &scenario);
-                act(&mut Probed::new(super::probe::reconnecting()?), &scenario)
+                act(&mut Probed::new(port), &scenario)
             }
         }
     }

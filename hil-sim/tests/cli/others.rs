@@ -218,18 +218,19 @@ fn a_file_that_becomes_active_is_asked_for_what_no_default_knows() {
         assert_eq!(code(&output), 0, "{}", stderr(&output));
         stderr(&output)
     };
-    let said = restored("mine.toml", "[rig]\nwheel_radius_mm = 25.0\n");
+    let mine = "[rig]\nwheel_width_mm = 31.0\n[sources]\n\"rig.wheel_radius_mm\" = \"calliper\"\n";
+    let said = restored("mine.toml", mine);
     assert_eq!(said.lines().count(), 1, "{said}");
     for part in ["mine.toml", "`prototype`", "rig.step_positions_mm", "plant.arm_coupling"] {
         assert!(said.contains(part), "{part}: {said}");
     }
-    // It states this one, and the other is a choice.
-    for other in ["rig.wheel_radius_mm", "drive.cruise_speed_mm_s"] {
+    // It states one, has a source of another, and the third is a choice.
+    for other in ["rig.wheel_width_mm", "rig.wheel_radius_mm", "drive.cruise_speed_mm_s"] {
         assert!(!said.contains(other), "{other}: {said}");
     }
     let saved = ["params", "save", "all.toml", "--file", "board.set"];
     assert_eq!(code(&super::rig_in(at, &saved)), 0);
     let all = std::fs::read_to_string(at.join("all.toml")).unwrap();
-    assert_eq!(restored("all.toml", &all), "");
+    assert!(restored("all.toml", &all).contains("rig.wheel_radius_mm"), "whose are they?");
     super::refused_in(at, &["params", "get"], &["--target", "--file"]);
 }
