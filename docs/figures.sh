@@ -14,15 +14,15 @@ write() {
 }
 wanted=$*
 write deploy deploy --out target/figures/deploy
-# Pictures of runs: a crossing, and two strategies with less friction than nominal. The constant
+# Pictures of runs: a crossing, and three strategies with less friction than nominal. The constant
 # preload does not climb there, so that its run ends with 1.
 case " $wanted " in *" picture "* | "  ")
-    for controller in constant scheduled; do
+    for controller in constant scheduled limit; do
         cargo rig deploy --set plant.mu=0.8 --controller $controller \
             --out target/figures/$controller || true
     done
     cargo rig report target/figures/constant/log.mcap target/figures/scheduled/log.mcap \
-        --picture docs/deployment.svg
+        target/figures/limit/log.mcap --picture docs/deployment.svg
     cargo rig deploy --out target/figures/nominal
     cargo rig report target/figures/nominal/log.mcap --animation docs/crossing_run.svg
     ;;

@@ -192,10 +192,6 @@ fn an_unknown_rig_is_commissioned_and_accepted() {
     if !long() {
         return;
     }
-    if let Ok(seed) = std::env::var("SEED") {
-        let why = commission(seed.parse().unwrap());
-        panic!("{why:#?}");
-    }
     let half = |first: u64| (0..10).map(move |n| first + 2 * n);
     let wrong = |seeds| -> Vec<(u64, Vec<String>)> {
         let each = |seed| Some((seed, commission(seed))).filter(|(_, why)| !why.is_empty());

@@ -1,5 +1,6 @@
 //! `rig report`: the page of a log, or of two side by side.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use serde_json::json;
@@ -25,20 +26,20 @@ pub(super) struct Args {
     #[arg(value_name = "LOG")]
     log: PathBuf,
 
-    /// Another log to compare it with.
-    #[arg(value_name = "OTHER")]
-    other: Option<PathBuf>,
+    /// Another log to compare it with; a third one for the picture.
+    #[arg(value_name = "OTHER", num_args = 0..=2)]
+    others: Vec<PathBuf>,
 
     /// Where the page goes; by default beside the first log.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 
-    /// With two logs: writes both in the same plots over time into this file, SVG.
-    #[arg(long, value_name = "FILE", requires = "other")]
+    /// With two or three logs: writes all in the same plots over time into this file, SVG.
+    #[arg(long, value_name = "FILE", requires = "others")]
     picture: Option<PathBuf>,
 
     /// Writes a crossing of the run as an animated SVG into this file.
-    #[arg(long, value_name = "FILE", conflicts_with = "other")]
+    #[arg(long, value_name = "FILE", conflicts_with = "others")]
     animation: Option<PathBuf>,
 
     /// Every column of the table of crossings.
@@ -52,17 +53,21 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     let log = log_at(&args.log);
-    let other = args.other.as_deref().map(log_at);
-    let inputs: Vec<&Path> = [Some(&*log), other.as_deref()].into_iter().flatten().collect();
+    let others: Vec<PathBuf> = args.others.iter().map(|other| log_at(other)).collect();
+    let inputs: Vec<&Path> = others.iter().chain([&log]).map(PathBuf::as_path).collect();
     let outputs =
         [("--out", &args.out), ("--picture", &args.picture), ("--animation", &args.animation)];
     for (name, to) in outputs {
         to.as_ref().map_or(Ok(()), |to| output::spare(name, to, &inputs))?;
     }
     let boots = recordings(&log).map_err(Failure::input)?;
-    match &other {
-        None => one(args, &log, &boots),
-        Some(other) => two(args, (&log, &boots), other),
+    match (&others[..], &args.picture) {
+        ([], _) => one(args, &log, &boots),
+        ([_, third], None) => {
+            let third = third.display();
+            Err(Failure::input(format!("{third}: a third log needs --picture, which draws it")))
+        }
+        ([other, more @ ..], _) => two(args, (&log, &boots), other, more.first()),
     }
 }
 
@@ -116,15 +121,25 @@ fn only<'a>(log: &Path, boots: &'a [Recording]) -> Result<&'a Recording, Failure
     )))
 }
 
-fn two(args: &Args, (log, boots): (&Path, &[Recording]), path: &Path) -> Result<Outcome, Failure> {
+fn two(
+    args: &Args,
+    (log, boots): (&Path, &[Recording]),
+    path: &Path,
+    third: Option<&PathBuf>,
+) -> Result<Outcome, Failure> {
     let others = recordings(path).map_err(Failure::input)?;
     let (first, second) = (only(log, boots)?, only(path, &others)?);
     let names = (log.display().to_string(), path.display().to_string());
     let text = compare_html((&names.0, first), (&names.1, second));
     let mut files = vec![page(args, log, "compare.html", &text)?];
     if let Some(picture) = &args.picture {
-        let [a, b] = titles([(&names.0, first), (&names.1, second)]);
-        write_text(picture, &beside_svg([(&a, first), (&b, second)]))?;
+        let thirds = third.map(|third| recordings(third)).transpose().map_err(Failure::input)?;
+        let more = third.zip(thirds.as_deref());
+        let mut runs = vec![(names.0.clone(), first), (names.1.clone(), second)];
+        if let Some((path, boots)) = more {
+            runs.push((path.display().to_string(), only(path, boots)?));
+        }
+        write_text(picture, &beside_svg(&titled(runs)))?;
         files.push(picture.clone());
     }
     let differences = differences(first, second);
@@ -142,14 +157,15 @@ fn two(args: &Args, (log, boots): (&Path, &[Recording]), path: &Path) -> Result<
     Ok(Outcome::of(is_complete))
 }
 
-/// Names of two runs: their strategies, or their logs where those are the same.
-fn titles(runs: [(&String, &Recording); 2]) -> [String; 2] {
-    let [a, b] = runs.map(|(_, run)| &run.summary.controller);
-    if a == b {
-        runs.map(|(name, _)| name.clone())
-    } else {
-        [a, b].map(|name| format!("{name} preload"))
+/// Runs named by their strategies, or by their logs where two have the same.
+fn titled(mut runs: Vec<(String, &Recording)>) -> Vec<(String, &Recording)> {
+    let kinds: BTreeSet<&String> = runs.iter().map(|(_, run)| &run.summary.controller).collect();
+    if kinds.len() == runs.len() {
+        for (name, run) in &mut runs {
+            *name = format!("{} preload", run.summary.controller);
+        }
     }
+    runs
 }
 
 fn human(differences: &[Difference]) -> String {

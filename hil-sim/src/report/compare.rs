@@ -94,7 +94,7 @@ pub fn compare_html((name_a, a): (&str, &Recording), (name_b, b): (&str, &Record
     };
     let more = folded("The other quantities", &ledger(&rest));
     page += &section("Crossing by crossing", &(ledger(&first) + &more));
-    let plots: String = panels([("A", a), ("B", b)])
+    let plots: String = panels(&[("A", a), ("B", b)])
         .iter()
         .rev()
         .map(|panel| figure(panel, Across::Time, SIZE, &panel.title))
@@ -134,24 +134,26 @@ pub fn table(differences: &[Difference]) -> (Vec<String>, Vec<Vec<String>>) {
 
 /// Size of the picture, CSS pixels: its text can still be read at 400.
 const PICTURE: (u32, u32) = (640, 860);
-/// Colours of the two.
-const COLOURS: [RGBColor; 2] = [palette::PRELOAD, palette::SPEED];
+/// Colours of up to three.
+const COLOURS: [RGBColor; 3] = [palette::PRELOAD, palette::SPEED, palette::GAP];
 
-/// The picture of two runs with their names: preload, position, slip and gap.
-pub fn beside_svg(runs: [(&str, &Recording); 2]) -> String {
-    let own = runs.map(|(name, run)| (name, run.since_command()));
-    stacked(PICTURE, &mut panels([(own[0].0, &own[0].1), (own[1].0, &own[1].1)]))
+/// The picture of up to three runs with their names: preload, position, slip and gap.
+pub fn beside_svg(runs: &[(String, &Recording)]) -> String {
+    let own: Vec<_> = runs.iter().map(|(name, run)| (&**name, run.since_command())).collect();
+    let own: Vec<_> = own.iter().map(|(name, run)| (*name, run)).collect();
+    stacked(PICTURE, &mut panels(&own))
 }
 
-/// Gap, preload, speed, position and slip of two runs with their names, each since its command.
-fn panels(runs: [(&str, &Recording); 2]) -> Vec<Panel> {
-    let views = runs.map(|(_, run)| View::new(run, Across::Time));
-    let x = (views[0].x.0.min(views[1].x.0), views[0].x.1.max(views[1].x.1));
+/// Gap, preload, speed, position and slip of runs with their names, each since its command.
+fn panels(runs: &[(&str, &Recording)]) -> Vec<Panel> {
+    let views: Vec<_> = runs.iter().map(|(_, run)| View::new(run, Across::Time)).collect();
+    let ends = views.iter().map(|view| view.x);
+    let x = ends.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1))).unwrap_or_default();
     let line = |of: &dyn Fn(&Tick) -> f64| -> Vec<Line> {
         let all = views.iter().zip(runs).zip(COLOURS);
         all.map(|((view, (name, _)), colour)| {
             let points = view.rows.iter().map(|row| (row.controller.t_s, of(row))).collect();
-            Line { name: name.to_owned().into(), look: Look::Other(colour), points }
+            Line { name: (*name).to_owned().into(), look: Look::Other(colour), points }
         })
         .collect()
     };
@@ -177,7 +179,7 @@ fn panels(runs: [(&str, &Recording); 2]) -> Vec<Panel> {
 }
 
 /// The gap of every crossing, beside the reference of the first run.
-fn own_gaps(views: &[View; 2], runs: [(&str, &Recording); 2], mut panel: Panel) -> Panel {
+fn own_gaps(views: &[View<'_>], runs: &[(&str, &Recording)], mut panel: Panel) -> Panel {
     let one = panel.also.map_or(1.0, |also| also.0);
     let own = |line: &CrossingLine| {
         let gap = Some(line.gap_mm).filter(|gap| gap.is_finite());
@@ -187,7 +189,7 @@ fn own_gaps(views: &[View; 2], runs: [(&str, &Recording); 2], mut panel: Panel) 
     panel.marks = all
         .map(|((view, (name, _)), colour)| {
             let points = view.recording.summary.crossings.iter().filter_map(own).collect();
-            Marks { name: name.to_owned().into(), shape: Shape::Dot, colour, points }
+            Marks { name: (*name).to_owned().into(), shape: Shape::Dot, colour, points }
         })
         .collect();
     (panel.lines, panel.shades, panel.rules) = Default::default();
@@ -240,8 +242,10 @@ mod tests {
     #[test]
     fn both_runs_are_in_every_plot() {
         let (a, b) = (example::deploy(), example::faulted());
-        let svg = beside_svg([("scheduled preload", &a), ("constant preload", &b)]);
-        for name in ["scheduled preload", "constant preload"] {
+        let names = ["scheduled preload", "constant preload", "limit preload"];
+        let svg =
+            beside_svg(&names.map(str::to_owned).into_iter().zip([&a, &b, &b]).collect::<Vec<_>>());
+        for name in names {
             // A line in four plots; the marks, with their rims, in one; five legends.
             assert_eq!(svg.matches(name).count(), 4 + 2 + 5, "{name}");
         }
