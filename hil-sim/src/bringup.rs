@@ -144,7 +144,12 @@ pub const CHECKS: &[CheckInfo] = &[
         "compression grows less than the preload",
     ),
     info("arm direction", Stage::Pretightener, "the same", "the angle's code grows"),
-    info("preload scale", Stage::Pretightener, "the same", "as spring and tread, within 25 %"),
+    info(
+        "preload scale",
+        Stage::Pretightener,
+        "the same",
+        "as the spring within 25 %, as the tread within 50 %",
+    ),
     info("preload released", Stage::Pretightener, "backwards until slack", "below 2 N, then idle"),
 ];
 

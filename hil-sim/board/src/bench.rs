@@ -13,6 +13,7 @@ use super::peripherals::HZ;
 use super::peripherals::rcc::Cause;
 use super::rtt::Probe;
 use hil_sim::injector::{FaultInjector, FaultTimes};
+use hil_sim::plant::draw::PlantParameters;
 use hil_sim::plant::rig::{Drives, VirtualRig};
 use hil_sim::plant::sensors::{Codes, Sensors};
 use hil_sim::record::{letter, starter};
@@ -114,6 +115,12 @@ impl<'a> Bench<'a> {
         bench.connect();
         bench.set_sensors(codes);
         Ok(bench)
+    }
+
+    /// Puts another plant there, stowed and unloaded, with its sensors.
+    pub fn put(&mut self, parameters: PlantParameters, seed: u64) {
+        self.sensors = Sensors::new(parameters.sensors.clone(), seed);
+        self.plant = VirtualRig::new(parameters, 0.0, 0.0, STEP_S);
     }
 
     /// Runs one millisecond. Returns inputs and outputs, and the lines of the log.

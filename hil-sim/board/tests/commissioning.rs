@@ -7,12 +7,11 @@ use std::path::Path;
 use std::time::Duration;
 
 use hil_sim::bringup::{self, Line, Progress, Stdin};
-use hil_sim::identify::accept::{Acceptance, accept};
+use hil_sim::identify::accept::accept;
 use hil_sim::identify::record::Record;
 use hil_sim::identify::result::identify;
 use hil_sim::params::{Client, Store, set_of};
 use hil_sim::plant::draw::PlantParameters;
-use hil_sim::plant::rig::VirtualRig;
 use hil_sim::plant::wall::{Step, Wall};
 use hil_sim::probe::{Port, PortError};
 use hil_sim::record::{Summary, Writer, recordings};
@@ -34,7 +33,7 @@ fn board(hidden: &Scenario, plant: Option<PlantParameters>) -> Board {
     let bench = Bench::new(elf(), strings(), hidden).expect("a bench");
     let mut board = Board { bench, log: Vec::new(), frames: Vec::new() };
     if let Some(plant) = plant {
-        board.bench.plant = VirtualRig::new(plant, 0.0, 0.0, 1e-3);
+        board.bench.put(plant, hidden.run.seed + 1);
     }
     board.until("mode: idle", 3000);
     board
@@ -79,16 +78,17 @@ fn give(board: &mut Board, scenario: &Scenario) {
     board.until("mode: idle", 3000);
 }
 
-/// The log of a run by this letter, until the board is in this mode.
+/// Longest run, ms.
+const LONGEST: u32 = 60_000;
+
+/// The log of a run by this letter, until the board is in this mode or holds a fault.
 fn run(
     board: &mut Board,
     (letter, mode): (u8, &str),
     known: &Scenario,
     path: &Path,
 ) -> (Record, Summary) {
-    board.send(letter);
-    board.until(mode, 120_000);
-    board.run(100);
+    ends(board, letter, mode);
     let bytes = std::mem::take(&mut board.frames);
     let file = File::create(path).expect("a file");
     let toml = known.to_toml();
@@ -99,17 +99,37 @@ fn run(
     (Record::read(path, None).expect("a log"), summary)
 }
 
+/// Commands a run, and waits for its end.
+fn ends(board: &mut Board, letter: u8, mode: &str) {
+    let from = board.log.len();
+    board.send(letter);
+    for _ in 0..LONGEST {
+        board.step();
+        let is_over = |line: &String| line.contains(mode) || line.contains("mode: fault hold");
+        if board.log[from..].iter().any(is_over) {
+            break;
+        }
+    }
+    board.run(100);
+}
+
 const OUT: (u8, &str) = (b's', "mode: deployed");
 const BACK: (u8, &str) = (b'r', "mode: retracted");
 
-/// Out and back on a board with these parameters.
-fn accepted(board: &mut Board, known: &Scenario, folder: &Path) -> Acceptance {
+/// Why out and back on a board with these parameters are not accepted.
+fn refused(board: &mut Board, known: &Scenario, folder: &Path) -> Vec<String> {
     give(board, known);
     let out = run(board, OUT, known, &folder.join("out.mcap"));
+    if !out.1.completed {
+        return out.1.faults.into_iter().map(|fault| fault.text).collect();
+    }
     give(board, known);
     let back = run(board, BACK, known, &folder.join("back.mcap"));
     let (records, runs): (Vec<_>, Vec<_>) = [out, back].into_iter().unzip();
-    accept(&records, &runs, &[]).expect("comparable")
+    match accept(&records, &runs, &[]) {
+        Ok(result) => result.reasons,
+        Err(error) => vec![error.to_string()],
+    }
 }
 
 /// What a rig may do after it was identified.
@@ -126,8 +146,11 @@ fn moved(wall: &Wall, by_mm: [f64; 3]) -> Wall {
     Wall::new(steps.map(|(s, by)| Step { position_mm: s.position_mm + by, ..*s }).collect())
 }
 
-/// Commissions the rig of a seed; why it fails, if it does.
-fn commission(seed: u64) -> Vec<String> {
+/// First of the seeds, which tuned nothing.
+const FIRST: u64 = 2_100_001;
+
+/// Commissions the rig of a seed: keys outside their interval, and why it fails, if it does.
+fn commission(seed: u64) -> (Vec<String>, Vec<String>) {
     let hidden = hidden(seed);
     let folder = tempfile::tempdir().expect("a folder");
     let folder = folder.path();
@@ -140,7 +163,7 @@ fn commission(seed: u64) -> Vec<String> {
     bringup::run(&mut line, &mut person, &mut progress, &mut |_| (), &mut |_| ()).expect("ends");
     let failed: Vec<_> = progress.checks().filter(|check| !check.ok).collect();
     if !failed.is_empty() {
-        return vec![format!("{failed:?}")];
+        return (Vec::new(), vec![format!("{failed:?}")]);
     }
     let mut mine = progress.proposed;
     assert_eq!(mine.sources.len(), 3, "{:?}", mine.sources);
@@ -153,13 +176,15 @@ fn commission(seed: u64) -> Vec<String> {
         give(&mut at, &mine);
         let path = folder.join(format!("{part}.mcap"));
         records.push(run(&mut at, OUT, &mine, &path).0);
-        at.send(BACK.0);
-        at.until(BACK.1, 120_000);
+        ends(&mut at, BACK.0, BACK.1);
     }
     // Identification.
-    let found = identify(&records, &records[0].scenario).expect("identified");
+    let found = match identify(&records, &records[0].scenario) {
+        Ok(found) => found,
+        Err(error) => return (Vec::new(), vec![error.to_string()]),
+    };
     let mine = found.scenario.clone();
-    let mut wrong = Vec::new();
+    let mut missed = Vec::new();
     let plant = hidden.plant();
     for (name, truth) in [
         ("tread.k_inf_pa_per_m", 1e9 * plant.ring.k_inf),
@@ -173,33 +198,31 @@ fn commission(seed: u64) -> Vec<String> {
         let of = found.parameter(name).expect(name);
         let (low, high) = (of.low.unwrap_or(f64::MIN), of.high.unwrap_or(f64::MAX));
         if !of.identified || !(low..=high).contains(&truth) {
-            wrong.push(format!("{name}: {truth} is not in {low} to {high}"));
+            missed.push(format!("{name}: {truth} is not in {low} to {high}"));
         }
     }
     // Acceptance, and not of another rig.
-    wrong.extend(accepted(&mut at, &mine, folder).reasons);
+    let mut wrong = refused(&mut at, &mine, folder);
     let (change, by) = CHANGES[(seed % 5) as usize];
     let mut plant = plant;
     by(&mut plant);
-    if accepted(&mut board(&hidden, Some(plant)), &mine, folder).passed {
+    if refused(&mut board(&hidden, Some(plant)), &mine, folder).is_empty() {
         wrong.push(format!("{change}: accepted"));
     }
-    wrong
+    (missed, wrong)
 }
 
 #[test]
-fn an_unknown_rig_is_commissioned_and_accepted() {
-    if !long() {
-        return;
+fn unknown_rigs_are_commissioned_and_accepted() {
+    let rigs = if long() { 20 } else { 1 };
+    let (mut missed, mut failed) = (Vec::new(), Vec::new());
+    for seed in FIRST..FIRST + rigs {
+        let (outside, wrong) = commission(seed);
+        eprintln!("seed {seed}: {outside:?} {wrong:?}");
+        missed.extend(outside);
+        failed.extend(wrong);
     }
-    let half = |first: u64| (0..10).map(move |n| first + 2 * n);
-    let wrong = |seeds| -> Vec<(u64, Vec<String>)> {
-        let each = |seed| Some((seed, commission(seed))).filter(|(_, why)| !why.is_empty());
-        Iterator::filter_map(seeds, each).collect()
-    };
-    let wrong = std::thread::scope(|scope| {
-        let other = scope.spawn(|| wrong(half(1_900_002)));
-        [wrong(half(1_900_001)), other.join().expect("no panic")].concat()
-    });
-    assert!(wrong.len() <= 1, "{wrong:#?}");
+    // 19 of 20 rigs; of seven keys each, nine of ten within their 95 %.
+    assert!(20 * failed.len() as u64 <= rigs, "{failed:#?}");
+    assert!(10 * missed.len() as u64 <= 7 * rigs + 9, "{missed:#?}");
 }

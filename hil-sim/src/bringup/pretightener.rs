@@ -11,6 +11,8 @@ use super::{BringupError, Check, Session, check};
 /// Duty of the pre-tightener, and the steps of preload, ms.
 const PRESS: f64 = 0.25;
 const STEPS_MS: [u32; 3] = [550, 850, 550];
+/// Factor by which a tread of the stated name may be stiffer or softer.
+const TREAD: f64 = 1.5;
 /// Rest behind a step, ms; the tread's memory is a tenth of a second. Its second half is judged.
 const REST_MS: u32 = 500;
 
@@ -184,7 +186,9 @@ fn judge(session: &mut Session<'_, '_>, levels: &[(f64, Level)]) -> Vec<Check> {
     // Differences: the arm's thrust presses the wheel as well.
     let carried = preload_n(rig, last.pressed) - preload_n(rig, first.pressed);
     let by_tread = (last.preload - first.preload) / carried;
+    // Rubber of one name differs by more than springs and motors do.
     let off = |ratio: f64| !(0.8..=1.25).contains(&ratio);
+    let off_tread = !(1.0 / TREAD..=TREAD).contains(&by_tread);
     let rounded = (slew * 10.0).round() / 10.0;
     let advice = if off(by_spring) && off(by_tread) && (by_spring > 1.0) == (by_tread > 1.0) {
         format!(
@@ -193,7 +197,7 @@ fn judge(session: &mut Session<'_, '_>, levels: &[(f64, Level)]) -> Vec<Check> {
             (by_spring * by_tread).sqrt(),
             rig.sense.preload_full_scale_n / (by_spring * by_tread).sqrt(),
         )
-    } else if off(by_tread) {
+    } else if off_tread {
         "the compression sensor's scale is wrong, or the tread is another: press it by a feeler \
          gauge; `rig identify` finds the tread"
             .to_owned()
@@ -211,7 +215,7 @@ fn judge(session: &mut Session<'_, '_>, levels: &[(f64, Level)]) -> Vec<Check> {
     }
     checks.push(check(
         "preload scale",
-        !off(by_spring) && !off(by_tread),
+        !off(by_spring) && !off_tread,
         format!(
             "{slew:.1} N/s at full duty ({by_spring:.2} of the parameter), {by_tread:.2} of the \
              tread's stiffness, dead time and lag {dead_s:.3} s"
