@@ -192,8 +192,10 @@ fn keys(found: &Identification, scenario: &Scenario) -> Vec<Key> {
             Limit::Part(part) => part * stated.abs(),
             Limit::Of(limit) => *limit,
         };
-        // The drive's force is known by its tolerance.
-        let ok = (of.identified || of.name == DRIVE) && (of.value - stated).abs() <= limit;
+        // The drive's force is known by its tolerance, another key by an interval within its limit.
+        let within = of.high.zip(of.low).is_some_and(|(high, low)| high - low <= 2.0 * limit);
+        let is_known = of.identified || within || of.name == DRIVE;
+        let ok = is_known && (of.value - stated).abs() <= limit;
         Some(Key { found: of.clone(), stated, limit, ok })
     };
     found.parameters.iter().filter_map(&mut key).collect()
