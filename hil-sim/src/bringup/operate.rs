@@ -31,6 +31,8 @@ const RELEASE_MS: u32 = 1000;
 /// Fall of the preload since the service mode was entered, N, at which it is entered again: one
 /// motion before its bound.
 const FALL_N: f64 = 9.0;
+/// Preload that a sensor may show of none, N, as the firmware's zero takes it.
+const UNLOADED_N: f64 = 3.0;
 /// Most motions of a release or a jog.
 const MOTIONS: u32 = 60;
 /// Rest behind a motion, ms.
@@ -263,8 +265,13 @@ impl Doing<'_, '_> {
             }
             let now = self.level().0;
             if (self.stopped)() || (before - now).abs() < CHANGED.0 {
-                let note = "the pre-tightener is slack; `rig zero` takes zeros at the stow end";
-                return Ok((self.reset()?, note.to_owned()));
+                let is_slack = now.abs() < UNLOADED_N;
+                let note = if is_slack {
+                    "the pre-tightener is slack; `rig zero` takes zeros at the stow end"
+                } else {
+                    "the preload no longer falls, and is not gone: the screw, or the sensor's zero"
+                };
+                return Ok((self.reset()? && is_slack, note.to_owned()));
             }
             if (entry - now).abs() > FALL_N {
                 self.reset()?;
