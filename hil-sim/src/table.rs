@@ -36,6 +36,13 @@ pub fn wrapped(text: &str, indent: &str, columns: u16) -> String {
     lines.iter().map(|line| format!("{indent}{line}\n")).collect()
 }
 
+/// A count of things of which one is a `noun`: "1 run", "2 runs".
+pub fn counted(count: impl std::fmt::Display, noun: &str) -> String {
+    let count = count.to_string();
+    let plural = if count == "1" || count == "-1" { "" } else { "s" };
+    format!("{count} {noun}{plural}")
+}
+
 /// A table of `head` and `rows` in the style of the others, its first column on the
 /// left and the rest on the right.
 pub fn plain(head: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> Table {
@@ -93,5 +100,11 @@ mod tests {
         assert_eq!(shown, ["0.00", "0.00", "-0.01", "0.00", "-"]);
         let shown = [-0.04, 0.04, -0.06, 0.06].map(|value| signed(value, 1));
         assert_eq!(shown, ["0.0", "0.0", "-0.1", "+0.1"]);
+    }
+
+    #[test]
+    fn one_is_singular() {
+        let shown = [0, 1, 2, -1].map(|n| counted(n, "slip event"));
+        assert_eq!(shown, ["0 slip events", "1 slip event", "2 slip events", "-1 slip event"]);
     }
 }

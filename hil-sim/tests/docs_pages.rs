@@ -193,7 +193,8 @@ fn figure(text: &str, before: &str) -> Option<f64> {
     text.split_once(before)?.1.split_whitespace().next()?.trim_end_matches(',').parse().ok()
 }
 
-/// Each command on the examples' page ends as the block behind it says, within 0.2 s and 0.05 mm.
+/// Each command on the examples' page ends as the block behind it says, within 0.2 s and 0.05 mm,
+/// and reports the limits that it names.
 #[test]
 fn the_examples_end_as_their_page_says() {
     let page = fs::read_to_string(root().join("examples/README.md")).expect("the page");
@@ -218,6 +219,11 @@ fn the_examples_end_as_their_page_says() {
             let near = now.zip(then).map_or(now == then, |(now, then)| (now - then).abs() < within);
             assert!(near, "{command}: `{before}` {then:?} on the page, now {now:?}");
         }
+        let codes = |text: &str| -> Vec<String> {
+            text.split("  limit ").skip(1).map(|line| line[..3].to_owned()).collect()
+        };
+        let (now, then) = (codes(&made), codes(printed));
+        assert!(then.is_empty() || now == then, "{command}: limits {then:?}, now {now:?}");
         seen += 1;
     }
     assert_eq!(seen, 5);

@@ -139,11 +139,12 @@ impl fmt::Display for Restart {
         if let Some(snapshot) = &self.snapshot {
             let DriveSnapshot { tick, position, level, fault, missed, .. } = *snapshot;
             match snapshot.mode() {
-                Some(mode) => write!(f, "; before: {mode:?}")?,
+                Some(mode) => write!(f, "; before: {}", mode.words())?,
                 None => write!(f, "; before: mode {}", snapshot.mode)?,
             }
             let level = level & !DriveSnapshot::UNSURE;
-            write!(f, " at tick {tick}, {position:.2} mm, level {level}")?;
+            let (s, ms) = (tick / 1000, tick % 1000);
+            write!(f, " at {s}.{ms:03} s, {position:.2} mm, level {level}")?;
             if fault != 0 {
                 write!(f, ", last fault {fault}")?;
             }

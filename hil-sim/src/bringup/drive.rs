@@ -6,6 +6,7 @@ use super::figures::{Counted, Scale, counted, mean};
 use super::line::{Motion, drive as drive_by, press};
 use super::motion::{CHANGED, bridge, driven, fault};
 use super::{BringupError, Check, Question, Seen, Session, check};
+use crate::table;
 
 /// Input data of port A, with the wheel encoder's lines.
 const PORT_A: u32 = 0x4800_0010;
@@ -39,7 +40,7 @@ pub(super) fn drive(session: &mut Session<'_, '_>) -> Result<Vec<Check>, Bringup
         return Ok(checks);
     }
     let counts = counted(driven(&slow, 0));
-    (session.say)(&format!("  {} counts", counts.sum));
+    (session.say)(&format!("  {}", table::counted(counts.sum, "count")));
     let turned = session.operator.look(Question::Turned)?;
     let shift = preload_change(&slow, &Scale::of(&session.expected.rig));
     checks.extend(turns(&slow, counts, shift, lines, turned));
@@ -131,7 +132,8 @@ fn turns(
         Seen::Nothing => "not",
         _ => "not observed",
     };
-    let shown = format!("{} counts, seen to turn: {eye}{}", counts.sum, fault(motion));
+    let shown =
+        table::counted(counts.sum, "count") + &format!(", seen to turn: {eye}{}", fault(motion));
     if counts.sum > 20 {
         let advice = match seen {
             Seen::Inwards => {

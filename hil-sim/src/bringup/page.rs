@@ -3,6 +3,7 @@
 use super::Progress;
 use crate::report::svg::escape;
 use crate::report::{capital, page_of};
+use crate::table::counted;
 
 /// The page; it needs no other file.
 pub fn html(progress: &Progress) -> String {
@@ -10,8 +11,7 @@ pub fn html(progress: &Progress) -> String {
     let (grade, headline) = match (progress.is_complete(), failed) {
         (true, _) => ("good", "The rig is wired as it should be".to_owned()),
         (false, 0) => ("fair", "Broken off: the next call goes on".to_owned()),
-        (false, 1) => ("bad", "1 check failed".to_owned()),
-        (false, failed) => ("bad", format!("{failed} checks failed")),
+        (false, failed) => ("bad", format!("{} failed", counted(failed, "check"))),
     };
     let mut body = String::new();
     for (stage, checks) in progress.stages() {

@@ -6,6 +6,7 @@ use interstage::supervise::Mode;
 
 use super::figures::{Scale, TURN, angle, counted, mean, output, part, stowed, turned};
 use super::{Action, BringupError, Check, Sensor, Session, check};
+use crate::table;
 
 /// `FLASH_OPTR` with its bit `DBANK`. Source: RM0440, 3.7.8.
 const OPTIONS: (u32, u32) = (0x4002_2020, 1 << 22);
@@ -42,7 +43,7 @@ pub(super) fn board(session: &mut Session<'_, '_>) -> Result<Vec<Check>, Bringup
     checks.push(check(
         "firmware",
         rows.len() >= ROWS as usize,
-        format!("{} ticks", rows.len()),
+        table::counted(rows.len(), "tick"),
         "the firmware does not run: `cargo rig flash`; its text log names the reason",
     ));
     if rows.len() < ROWS as usize {
@@ -104,7 +105,7 @@ pub(super) fn sensors(session: &mut Session<'_, '_>) -> Result<Vec<Check>, Bring
     let mut checks = vec![check(
         "encoder at rest",
         counts.range <= 2,
-        format!("{} counts", counts.range),
+        table::counted(counts.range, "count"),
         "the wheel turns, or its lines pick up noise: hold it still, look at the shields",
     )];
     let (preload, noise) = mean(rows.iter().map(|row| scale.preload(row)));

@@ -13,6 +13,7 @@ use super::output;
 use crate::campaign::{Campaign, Frame, Shard};
 use crate::files::write_text;
 use crate::progress;
+use crate::table::counted;
 
 /// Which part of a campaign, and how its outcome is shown.
 #[derive(Clone, Debug, clap::Args)]
@@ -178,7 +179,10 @@ impl CampaignArgs {
         };
         let (done, of) = (lines.len(), places.len());
         if done == 0 {
-            return Err(Failure::run(format!("interrupted before the first of {of} cases")));
+            return Err(Failure::run(format!(
+                "interrupted before the first of {}",
+                counted(of, "case")
+            )));
         }
         // One machine reads its lines as `rig merge` does, so that both print the same.
         let read = |(at, line): &(usize, Value)| L::deserialize(line).map(|line| (*at, line));

@@ -8,7 +8,7 @@ use super::scenario::RunArgs;
 use crate::campaign::{Column, Frame, column};
 use crate::compare::{self, Comparison, Entry, STRATEGIES};
 use crate::oracle::Effort;
-use crate::table::{is_narrow, width, wrapped};
+use crate::table::{counted, is_narrow, width, wrapped};
 
 /// Compares four preload strategies on the same random rigs: scheduled, constant at cruise,
 /// constant at the limit, reactive; and the oracle, the best run that the plants allow.
@@ -86,8 +86,8 @@ const ORACLE: &str = "oracle: the fastest run found for each plant, all of it kn
 
 fn human(comparison: &Comparison, rows: &Frame) -> String {
     let mut text = format!(
-        "{} rigs, each strategy tuned to a worst gap of {:.3} mm\n{}",
-        comparison.runs,
+        "{}, each strategy tuned to a worst gap of {:.3} mm\n{}",
+        counted(comparison.runs, "rig"),
         comparison.gap_ref_mm,
         rows.fitted(&["moving_s", "moving_ratio"], is_narrow()).text()
     );

@@ -14,7 +14,7 @@ use crate::faults::campaign::{
 };
 use crate::progress;
 use crate::scenario::{Scenario, nearest_word};
-use crate::table::is_narrow;
+use crate::table::{counted, is_narrow};
 
 /// Breaks everything that can break, each fault at random instants of random rigs, out and
 /// back, and judges the outcome by the true state of the plant.
@@ -137,8 +137,9 @@ fn clean(args: &Args, count: u64) -> Result<Outcome, Failure> {
     let (_, outcome) = &found;
     let (alarms, incomplete) = (outcome.faults.len(), outcome.runs - outcome.completed);
     let head = format!(
-        "{} deployments without a fault: {alarms} false alarms, {incomplete} incomplete\n",
-        outcome.runs
+        "{} without a fault: {}, {incomplete} incomplete\n",
+        counted(outcome.runs, "deployment"),
+        counted(alarms, "false alarm")
     );
     montecarlo::print(&found, &args.campaign, &head, alarms == 0 && incomplete == 0)
 }
@@ -149,9 +150,9 @@ fn human(outcome: &Matrix, rows: &Frame) -> String {
     let rows = rows.fitted(&["latency_median_ms"], true);
     let rows = rows.fitted(&["worst_preload_n", "worst_motion_mm"], is_narrow());
     let mut text = format!(
-        "{} faults at {} instants each: {} found as something else, {} undetected, {} unsafe\n{}",
-        outcome.matrix.len(),
-        outcome.instants,
+        "{} at {} each: {} found as something else, {} undetected, {} unsafe\n{}",
+        counted(outcome.matrix.len(), "fault"),
+        counted(outcome.instants, "instant"),
         outcome.otherwise,
         outcome.undetected,
         outcome.unheld,

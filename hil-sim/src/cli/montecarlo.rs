@@ -8,7 +8,7 @@ use super::scenario::RunArgs;
 use crate::campaign::{Column, Frame, column};
 use crate::montecarlo::{self, Least, RunLine};
 use crate::scenario::{MismatchDraw, Scenario};
-use crate::table::{number, plain, width, wrapped};
+use crate::table::{counted, number, plain, width, wrapped};
 
 /// Runs many random rigs, each drawn from its own seed, and shows what limits them.
 ///
@@ -43,13 +43,13 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
         _ => outcome.completed == outcome.runs,
     };
     let head = format!(
-        "{} runs of {}, {} controller, rig {}: {} completed, {} slip events\n",
-        outcome.runs,
+        "{} of {}, {} controller, rig {}: {} completed, {}\n",
+        counted(outcome.runs, "run"),
         scenario.run.direction.name(),
         scenario.run.controller.name(),
         scenario.preset,
         outcome.completed,
-        outcome.slip_events
+        counted(outcome.slip_events, "slip event")
     );
     print(&found, &args.campaign, &head, sound)
 }
@@ -120,8 +120,8 @@ fn human(outcome: &montecarlo::Outcome) -> String {
     }
     text += "What limits it\n";
     for limit in &outcome.limits {
-        let (runs, all) = (limit.runs, outcome.runs);
-        let limit = format!("limit {} in {runs} of {all} runs: {}", limit.code, limit.text);
+        let (runs, all) = (limit.runs, counted(outcome.runs, "run"));
+        let limit = format!("limit {} in {runs} of {all}: {}", limit.code, limit.text);
         text += &wrapped(&limit, "  ", width());
     }
     if outcome.limits.is_empty() {

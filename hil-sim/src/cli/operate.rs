@@ -26,9 +26,11 @@ pub enum Verb {
     ///
     /// Ctrl-C stops it.
     Home(Place),
-    /// Takes the preload off, within the bounds of the firmware's service mode.
+    /// Takes the preload off: turns the pre-tightener back, drive at rest, within the bounds of
+    /// the firmware's service mode.
     ///
-    /// Ctrl-C stops it. The wheel no longer holds the unit afterwards.
+    /// Without preload it turns it back by a second at a quarter of the duty: the wheel comes
+    /// clear of the wall. Ctrl-C stops it. The wheel no longer holds the unit afterwards.
     Release(Place),
     /// Resets the controller, which takes the sensors' zeros at the stow end.
     ///

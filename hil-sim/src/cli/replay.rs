@@ -8,6 +8,7 @@ use super::failure::{Failure, Outcome};
 use super::output;
 use crate::record::{Cut, Mark, Run, Unknown};
 use crate::replay::{Replayed, replay};
+use crate::table::counted;
 
 /// Runs recorded logs through the controller again; it must give the same bits.
 ///
@@ -72,12 +73,14 @@ fn unknown(file: &Path, error: &Unknown) -> Failure {
 
 fn human(log: &Log) -> String {
     let (file, result) = (log.file.display(), &log.result);
+    let (ticks, blind) = (counted(result.ticks, "tick"), counted(result.blind, "tick"));
     let mut text = match &result.difference {
         Some(difference) => format!("{file}: differs at {difference}\n"),
         None if log.equal => {
-            format!("{file}: {} ticks and {} entries, equal\n", result.ticks, result.events)
+            let events = counted(result.events, "event");
+            format!("{file}: {ticks} and {events}, equal\n")
         }
-        None => format!("{file}: {} ticks equal\n", result.ticks),
+        None => format!("{file}: {ticks} equal\n"),
     };
     text += &log.cut.map_or_else(String::new, |cut| format!("  incomplete log: {cut}\n"));
     if let Some((tick, mark)) = result.missing {
@@ -85,10 +88,9 @@ fn human(log: &Log) -> String {
             Mark::Joined { .. } => "it does not begin with the target's start",
             _ => "the controller's state is not known after a gap",
         };
-        text += &format!("  {} ticks from {tick} on not run again: {why} ({mark})\n", result.blind);
+        text += &format!("  {blind} from {tick} on not run again: {why} ({mark})\n");
     } else if result.blind > 0 {
-        text +=
-            &format!("  {} ticks not run again: the log does not begin at boot\n", result.blind);
+        text += &format!("  {blind} not run again: the log does not begin at boot\n");
     }
     text
 }

@@ -61,8 +61,12 @@ pub struct RunArgs {
 
     /// A fault and its onset in seconds from boot, as in supply.weak@2, in place of the scenario's
     /// `run.faults`, which can say more; may be repeated.
-    #[arg(long, value_name = "TARGET.KIND@S", visible_alias = "board-fault")]
+    #[arg(long, value_name = "TARGET.KIND@S")]
     fault: Vec<String>,
+
+    /// Another name of --fault.
+    #[arg(long, value_name = "TARGET.KIND@S")]
+    board_fault: Vec<String>,
 
     /// Draws by the seed, too, what the controller is not told: all of `mismatch.*` within
     /// its wide range.
@@ -124,20 +128,22 @@ impl RunArgs {
         if let Some(seed) = self.seed {
             sets.push(format!("run.seed={seed}"));
         }
-        let faults: Result<Vec<_>, _> = self.fault.iter().map(|text| entry_of(text)).collect();
-        if !self.fault.is_empty() {
-            sets.push(format!("run.faults=[{}]", faults?.join(",")));
+        let board_faults = self.board_fault.iter().map(|text| entry_of("--board-fault", text));
+        let faults = self.fault.iter().map(|text| entry_of("--fault", text)).chain(board_faults);
+        let faults = faults.collect::<Result<Vec<_>, _>>()?;
+        if !faults.is_empty() {
+            sets.push(format!("run.faults=[{}]", faults.join(",")));
         }
         self.scenario.resolve_with(&sets)
     }
 }
 
-/// The entry of `run.faults` that a text of `--fault` stands for.
-fn entry_of(text: &str) -> Result<String, Failure> {
+/// The entry of `run.faults` that a text of this option is.
+fn entry_of(option: &str, text: &str) -> Result<String, Failure> {
     let parts = text.split_once('@').and_then(|(fault, at)| Some((fault.split_once('.')?, at)));
     let at = parts.and_then(|(_, at)| at.parse::<f64>().ok()).filter(|at| at.is_finite());
     let (Some(((target, kind), _)), Some(at)) = (parts, at) else {
-        let error = format!("--fault {text}: expected TARGET.KIND@SECONDS, as in supply.weak@2");
+        let error = format!("{option} {text}: expected TARGET.KIND@SECONDS, as in supply.weak@2");
         return Err(Failure::input(error));
     };
     Ok(format!("{{target={target:?},kind={kind:?},at_s={at:?}}}"))
@@ -162,7 +168,8 @@ mod tests {
             adversarial: false,
             controller: Some("limit".into()),
             seed: Some(5),
-            fault: vec!["supply.weak@2".into(), "encoder-line-b.off@5.5".into()],
+            fault: vec!["supply.weak@2".into()],
+            board_fault: vec!["encoder-line-b.off@5.5".into()],
         };
         let scenario = args.resolve().unwrap();
         assert_eq!(scenario.preset, "fe");
@@ -180,12 +187,13 @@ mod tests {
     #[test]
     fn a_fault_that_cannot_be_read_is_named() {
         for text in ["supply-dip@2", "supply.weak", "supply.weak@soon", "supply.weak@inf", "@2"] {
-            let args = RunArgs { fault: vec![text.into()], ..RunArgs::default() };
-            let error = args.resolve().unwrap_err().to_string();
-            assert!(
-                error.starts_with(&format!("--fault {text}: expected TARGET.KIND@S")),
-                "{error}"
-            );
+            let fault = RunArgs { fault: vec![text.into()], ..RunArgs::default() };
+            let board_fault = RunArgs { board_fault: vec![text.into()], ..RunArgs::default() };
+            for (option, args) in [("--fault", fault), ("--board-fault", board_fault)] {
+                let error = args.resolve().unwrap_err().to_string();
+                let expected = format!("{option} {text}: expected TARGET.KIND@S");
+                assert!(error.starts_with(&expected), "{error}");
+            }
         }
         let args = RunArgs { fault: vec!["suply.weak@2".into()], ..RunArgs::default() };
         assert!(args.resolve().unwrap_err().to_string().contains("run.faults[1].target"));

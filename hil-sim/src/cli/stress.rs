@@ -8,7 +8,7 @@ use super::failure::{Failure, Outcome};
 use super::scenario::seed;
 use crate::campaign::{Column, Frame, column};
 use crate::stress::{self, StressReport, Worst};
-use crate::table::{is_narrow, width, wrapped};
+use crate::table::{counted, is_narrow, width, wrapped};
 
 /// The plant at the ends of every range.
 ///
@@ -71,7 +71,7 @@ const COLUMNS: [Column; 9] = [
 
 fn human(report: &StressReport, rows: &Frame) -> String {
     let rows = rows.fitted(&["tau_s"], is_narrow()).text();
-    let mut text = format!("{} cases of the plant\n{rows}", report.cases);
+    let mut text = format!("{} of the plant\n{rows}", counted(report.cases, "case"));
     for (name, refused) in &report.refused {
         let refused = format!("refused {}: {name}, as: {}", refused.count, refused.example);
         text += &wrapped(&refused, "  ", width());
@@ -79,5 +79,5 @@ fn human(report: &StressReport, rows: &Frame) -> String {
     for failure in &report.failed {
         text += &format!("  failed: {}: {:?}\n", failure.why, failure.case);
     }
-    text + &format!("{} failures\n", report.failed.len())
+    text + &format!("{}\n", counted(report.failed.len(), "failure"))
 }

@@ -123,7 +123,7 @@ mod tests {
         assert!(line.contains(&format!(" {:.2} ", c.step_mm)), "{line}");
         assert!(line.contains(" - "), "the missing measurement is shown: {line}");
         assert!(text.contains(" measured "), "no heading is broken: {text}");
-        let words = ["preload limit", "slow preload"];
+        let words = ["preload limit", "preload slew"];
         assert!(words.iter().any(|words| line.contains(words)), "{line}");
         assert!(!text.contains(" predicted ") && run(&summary, &[], true).contains(" predicted "));
         assert!(text.ends_with("  wrote out/run/report.html\n"));

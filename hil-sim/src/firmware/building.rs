@@ -5,6 +5,7 @@ use std::io::{self, BufRead, BufReader};
 use std::process::{Command, ExitStatus, Stdio};
 
 use crate::progress;
+use crate::table::counted;
 
 /// Runs cargo and returns its messages, one JSON object a line; its warnings and errors go to
 /// standard error.
@@ -19,7 +20,7 @@ pub(super) fn run(cargo: &mut Command, what: &str) -> io::Result<(ExitStatus, St
             if compiled == 1 {
                 progress.line(&format!("building {what}, once"));
             }
-            progress.say(&format!("building {what}: {compiled} units compiled"));
+            progress.say(&format!("building {what}: {} compiled", counted(compiled, "unit")));
         }
         messages += &(line + "\n");
     }

@@ -3,6 +3,7 @@
 //! What is missing between two frames is an item of its own. Garbage ends at the next valid
 //! frame. A target has restarted if its sequence or its clock goes back.
 
+use crate::table::counted;
 use interstage::log::capture::CaptureChunk;
 use interstage::log::frame::{Body, Found, Frame, find};
 use interstage::log::identity::SCHEMA;
@@ -75,13 +76,15 @@ impl std::fmt::Display for Mark {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::Lost { frames, dropped } => {
-                write!(f, "{frames} frames lost, {dropped} of them for lack of room")
+                write!(f, "{} lost, {dropped} of them for lack of room", counted(frames, "frame"))
             }
-            Self::Garbage { bytes } => write!(f, "{bytes} bytes that are no frame"),
-            Self::Skipped { ticks } => write!(f, "{ticks} ticks not logged"),
-            Self::Overrun { ticks } => write!(f, "{ticks} ticks did not run"),
+            Self::Garbage { bytes } => {
+                write!(f, "garbage between frames: {}", counted(bytes, "byte"))
+            }
+            Self::Skipped { ticks } => write!(f, "{} not logged", counted(ticks, "tick")),
+            Self::Overrun { ticks } => write!(f, "{} did not run", counted(ticks, "tick")),
             Self::Joined { frames } => {
-                write!(f, "the log begins {frames} frames after the target's first")
+                write!(f, "the log begins {} after the target's first", counted(frames, "frame"))
             }
             Self::Restart => write!(f, "the target restarted"),
             Self::Schema { found } => {

@@ -20,6 +20,7 @@ use crate::plant::rig::{Truth, VirtualRig};
 use crate::plant::spread::Section;
 use crate::scenario::{MismatchDraw, Scenario};
 use crate::session::{TICK_S, longest_s};
+use crate::table::counted;
 
 /// Largest distance from the end of travel after arrival, mm: twice the effect of creep and
 /// wheel radius on the drawn rigs.
@@ -157,7 +158,7 @@ impl RunRecorder {
             slip_mm: truth.slip_mm,
             mean_preload_n: self.preload_sum / f64::from(self.moving.max(1)),
             energy_j: truth.work_mj * 1e-3,
-            wear_j: truth.wear_mj * 1e-3,
+            friction_work_j: truth.friction_work_mj * 1e-3,
             injected: scenario.run.faults.iter().map(ToString::to_string).collect(),
             real_time_factor: total_s / wall_s.max(1e-9),
             trace_digest: self.digest.finalize().iter().map(|b| format!("{b:02x}")).collect(),
@@ -241,7 +242,7 @@ pub fn text(event: &Event) -> String {
         Event::Refused(command) => format!("command refused in this mode: {}", command.word()),
         Event::Fault(fault) => format!("fault {}: {}", fault.code(), fault.sentence()),
         Event::Limit(limit) => format!("limit {}: {}", limit.code(), limit.sentence()),
-        Event::Lost(entries) => format!("{entries} log entries lost"),
+        Event::Lost(entries) => format!("lost of the log: {}", counted(entries, "event")),
         Event::Restart(restart) => restart.to_string(),
         Event::Service(ServiceDuties { drive, pretightener }) => {
             let percent = |duty: Duty| 100.0 * f64::from(duty.to_bits()) / 32_768.0;

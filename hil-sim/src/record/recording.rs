@@ -20,6 +20,7 @@ use super::recorder::{restart_words, text};
 use super::time_lost::{TimeLost, TimeSplit};
 use super::{Controller, CrossingLine, LedgerLine, LogLine, Recording, Run, Summary, Tick};
 use crate::scenario::Scenario;
+use crate::table::counted;
 
 /// Reads the recordings of any log: of each start of the target, as its clock begins anew there.
 pub fn recordings(path: &Path) -> Result<Vec<Recording>, ReadError> {
@@ -62,7 +63,7 @@ fn with_truth(bytes: &[u8], strange: &mut Vec<String>) -> Option<Recording> {
         _ => {}
     });
     if let (count, Some(why)) = left_out {
-        strange.push(format!("{count} ticks of another version are left out: {why}"));
+        strange.push(format!("{} of another version left out: {why}", counted(count, "tick")));
     }
     match summary.filter(|_| end.is_complete)? {
         Ok(summary) => recording.summary = summary,
@@ -187,7 +188,7 @@ fn summary(run: &Run) -> Summary {
         slip_mm: unknown,
         mean_preload_n: preload / moving.len() as f64,
         energy_j: unknown,
-        wear_j: unknown,
+        friction_work_j: unknown,
         real_time_factor: 1.0,
         ..Summary::default()
     }
@@ -333,7 +334,7 @@ mod tests {
         assert_eq!((truth.position_true_mm, truth.slip_mm), (2.0, 0.5));
         assert!(truth.preload_true_n.is_nan());
         let missing = &recording.summary.missing;
-        assert!(missing.len() == 1 && missing[0].contains("1 ticks"), "{missing:?}");
+        assert!(missing.len() == 1 && missing[0].contains("1 tick of"), "{missing:?}");
         assert!(missing[0].contains("hovering"), "{missing:?}");
         // A truth of another form is no tick without truth.
         tick["slip_mm"] = "none".into();

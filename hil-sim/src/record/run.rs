@@ -12,6 +12,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{Controller, Counts, Decoder, Item, Mark};
 use crate::scenario::{Scenario, ScenarioError};
+use crate::table::counted;
 
 /// Firmware and parameters that made a log.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -61,9 +62,10 @@ impl std::fmt::Display for Cut {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "the file is cut off at {:.3} s: ", self.at_s)?;
         match (self.missing_ticks, self.lacks_bytes) {
-            (Some(ticks), _) => write!(f, "{ticks} ticks behind it are missing"),
+            (Some(ticks), _) => write!(f, "missing behind it: {}", counted(ticks, "tick")),
             (None, Some(bytes)) => {
-                write!(f, "its last record lacks {bytes} bytes, and what followed is not known")
+                let bytes = counted(bytes, "byte");
+                write!(f, "its last record lacks {bytes}, and what followed is not known")
             }
             (None, None) => f.write_str("it does not say how much followed"),
         }
@@ -174,8 +176,8 @@ impl Run {
     /// What is missing of the log, in sentences; none if nothing is known to be.
     pub fn missing(&self) -> Vec<String> {
         let Counts { lost_frames, lost_ticks, .. } = self.counts;
-        let lost = (lost_frames + lost_ticks > 0)
-            .then(|| format!("{lost_frames} frames and {lost_ticks} ticks are missing in it"));
+        let (frames, ticks) = (counted(lost_frames, "frame"), counted(lost_ticks, "tick"));
+        let lost = (lost_frames + lost_ticks > 0).then(|| format!("{frames} and {ticks} missing"));
         self.cut.map(|cut| cut.to_string()).into_iter().chain(lost).collect()
     }
 

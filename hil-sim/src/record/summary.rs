@@ -137,8 +137,9 @@ pub struct Summary {
     pub mean_preload_n: f64,
     /// Mechanical energy of the drive, J.
     pub energy_j: f64,
-    /// Tread wear: friction work of creep and slip, J.
-    pub wear_j: f64,
+    /// Friction work of creep and slip at the tread, J: what wears it.
+    #[serde(alias = "wear_j")]
+    pub friction_work_j: f64,
     /// Latched faults.
     pub faults: Vec<Report>,
     /// Active limits reported.

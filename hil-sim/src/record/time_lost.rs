@@ -6,9 +6,12 @@ use super::tick::{CROSSES, MOVES, PRELOADS};
 use crate::table::number;
 
 /// What a run takes longer than its travel at cruise speed, s. With that travel the parts add up
-/// to the duration.
+/// to the duration, but for rests between motions.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TimeLost {
+    /// Nothing lost: the travel, at cruise speed.
+    #[serde(default)]
+    pub cruise_s: f64,
     /// At rest, until the preload carries the wheel.
     pub preload_s: f64,
     /// Before the steps: acceleration at the start, waiting for the preload, the window in which
@@ -34,12 +37,14 @@ impl TimeLost {
     }
 
     pub fn sentence(&self) -> String {
-        let Self { preload_s, approach_s, crossing_s, end_s } = self;
-        let [preload, approach, crossing, end] =
-            [preload_s, approach_s, crossing_s, end_s].map(|part| number(*part, 2));
+        let Self { cruise_s, preload_s, approach_s, crossing_s, end_s } = *self;
+        let sum_s = cruise_s + preload_s + approach_s + crossing_s + end_s;
+        let [sum, cruise, preload, approach, crossing, end] =
+            [sum_s, cruise_s, preload_s, approach_s, crossing_s, end_s].map(|s| number(s, 3));
         format!(
-            "Time beside travel at cruise speed: {preload} s until the preload carries the wheel, \
-             {approach} s before the steps, {crossing} s on them, {end} s at the end"
+            "{sum} s = {cruise} s for the travel at cruise speed + {preload} s until the preload \
+             carries the wheel + lost by going slower: {approach} s before the steps + \
+             {crossing} s on them + {end} s behind the last"
         )
     }
 }
@@ -95,7 +100,9 @@ impl TimeSplit {
 
     /// What the parts take longer than their travel at this speed, mm/s.
     pub(super) fn lost(&self, cruise_mm_s: f64) -> TimeLost {
+        let parts = [self.preload, self.approach, self.crossing, self.open];
         TimeLost {
+            cruise_s: parts.iter().map(|part| part.travel_mm).sum::<f64>() / cruise_mm_s,
             preload_s: self.preload.lost_s(cruise_mm_s),
             approach_s: self.approach.lost_s(cruise_mm_s),
             crossing_s: self.crossing.lost_s(cruise_mm_s),
@@ -133,9 +140,16 @@ mod tests {
             }
         }
         let lost = split.lost(10.0);
-        let expected =
-            TimeLost { preload_s: 3.0, approach_s: 1.5, crossing_s: 3.2 + 0.5, end_s: 1.5 };
+        let expected = TimeLost {
+            cruise_s: 7.3,
+            preload_s: 3.0,
+            approach_s: 1.5,
+            crossing_s: 3.2 + 0.5,
+            end_s: 1.5,
+        };
+        assert!(lost.sentence().starts_with("17.000 s = 7.300 s for the travel"), "{lost:?}");
         for (got, wanted) in [
+            (lost.cruise_s, expected.cruise_s),
             (lost.preload_s, expected.preload_s),
             (lost.approach_s, expected.approach_s),
             (lost.crossing_s, expected.crossing_s),

@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use super::{Controller, Counts, Item, Mark, mode_words, stage_name, text};
-use crate::table::number;
+use crate::table::{counted, number};
 
 /// The latest items of a log, and its rates.
 pub struct View {
@@ -62,12 +62,12 @@ impl View {
     pub(crate) fn rates_text(&self, counts: &Counts) -> String {
         let (ticks, bytes) = self.rates;
         format!(
-            "rig {}  {} ticks, {ticks:.0}/s, {:.0} kB/s  lost {} frames, {} ticks  restarts {}",
+            "rig {}  {}, {ticks:.0}/s, {:.0} kB/s  lost {}, {}  restarts {}",
             self.rig,
-            counts.ticks,
+            counted(counts.ticks, "tick"),
             bytes * 1e-3,
-            counts.lost_frames,
-            counts.lost_ticks,
+            counted(counts.lost_frames, "frame"),
+            counted(counts.lost_ticks, "tick"),
             counts.restarts,
         )
     }

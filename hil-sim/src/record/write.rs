@@ -16,13 +16,14 @@ use super::{
     write_mcap,
 };
 use crate::files::{Failure, FileError, atomic_write, make_directory, with_causes};
+use crate::table::counted;
 
 /// Ticks between two flushes.
 const FLUSH_TICKS: u64 = 1000;
 
 /// Why writing stopped. What was flushed before stays readable.
 #[derive(Debug, thiserror::Error)]
-#[error("writing stopped after {ticks} ticks, of which {kept} are safe: {}", with_causes(&**source))]
+#[error("writing stopped after {}, of which {kept} are safe: {}", counted(ticks, "tick"), with_causes(&**source))]
 pub struct WriteError {
     /// Ticks taken.
     pub ticks: u64,

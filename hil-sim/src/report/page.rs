@@ -7,6 +7,7 @@ use super::svg::escape;
 use super::verdict::{Grade, gap_sentence, headline, origin, slip_sentence, verdict};
 use super::{animation, crossings, tables};
 use crate::record::Recording;
+use crate::table::counted;
 
 const STYLE: &str = include_str!("style.css");
 const PLOTS: &str = include_str!("plots.js");
@@ -41,7 +42,7 @@ pub fn html(recording: &Recording, more: &[Section]) -> String {
         escape(&headline(s)),
         capital(&gap_sentence(s)),
         slip_sentence(s),
-        count(s.faults.len(), "fault") + ", " + &count(s.limits.len(), "limit") + " reported",
+        counted(s.faults.len(), "fault") + ", " + &counted(s.limits.len(), "limit") + " reported",
     );
     page += &section("Summary", &tables::summary(s));
     page += &section(
@@ -50,8 +51,8 @@ pub fn html(recording: &Recording, more: &[Section]) -> String {
             "{}<p class=\"note\">The gap of a crossing is the clearance between the step root \
 and the undeformed wheel at the instant at which the lower wall stops carrying load (on retraction: \
  begins to). {} Lead: how long before the corner touched the preload was reached; negative: how long \
-after that it was missing. Slowed by: what keeps the crossing from being faster; by a slow preload \
-if more of it would take longer to build than it saves.</p>\n",
+after that it was missing. Slowed by: what keeps the crossing from being faster; by the preload slew \
+if more preload would take longer to build than it saves.</p>\n",
             tables::ledger(&s.crossings),
             if s.measured {
                 "This log is a controller's: every figure is measured or estimated by it, and where \
@@ -207,14 +208,6 @@ fn stack(recording: &Recording, across: Across) -> String {
         html += &figure(&panel, across, SIZE, &name);
     }
     html
-}
-
-fn count(n: usize, what: &str) -> String {
-    match n {
-        0 => format!("no {what}"),
-        1 => format!("1 {what}"),
-        n => format!("{n} {what}s"),
-    }
 }
 
 /// A text with a capital at its beginning.

@@ -43,7 +43,7 @@ pub(super) fn summary(s: &Summary) -> String {
         (if s.measured { "Measured slip" } else { "Gross slip" }, with_unit(s.slip_mm, 3, "mm")),
         ("Mean preload", with_unit(s.mean_preload_n, 2, "N")),
         ("Drive energy", with_unit(s.energy_j, 3, "J")),
-        ("Friction work", with_unit(s.wear_j, 3, "J")),
+        ("Friction work", with_unit(s.friction_work_j, 3, "J")),
         (
             "Real-time factor",
             if s.measured { String::new() } else { number(s.real_time_factor, 1) },
@@ -185,7 +185,7 @@ pub(crate) fn slowed_by(line: &CrossingLine) -> &'static str {
     match line.limited_by {
         None => "-",
         Some(LimitedBy::Preload) => "preload limit",
-        Some(LimitedBy::Slew) => "slow preload",
+        Some(LimitedBy::Slew) => "preload slew",
         Some(LimitedBy::Friction) => "low friction",
         Some(LimitedBy::Resonance) => "resonance",
         Some(LimitedBy::LeastSpeed) => "least speed",

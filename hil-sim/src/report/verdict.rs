@@ -2,7 +2,7 @@
 
 use crate::record::Summary;
 use crate::scenario::brief;
-use crate::table::number;
+use crate::table::{counted, number};
 
 /// How a run went.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -115,10 +115,7 @@ pub(crate) fn origin(summary: &Summary) -> String {
 /// The headline: the outcome of the run.
 pub(crate) fn headline(summary: &Summary) -> String {
     let verb = if summary.direction == "retract" { "Retracted" } else { "Deployed" };
-    let crossings = match summary.crossings.len() {
-        1 => "1 crossing".to_owned(),
-        n => format!("{n} crossings"),
-    };
+    let crossings = counted(summary.crossings.len(), "crossing");
     let moving = format!("{:.2} s in motion", summary.moving_s);
     let time = summary.duration_s.map_or(moving.clone(), |duration_s| {
         format!("{duration_s:.2} s from the command ({moving})")

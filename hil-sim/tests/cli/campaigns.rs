@@ -33,6 +33,16 @@ fn five_rigs_complete_with_every_key_and_the_shards_are_the_whole() {
 }
 
 #[test]
+fn one_of_a_kind_is_singular() {
+    let one = |arguments: &[&str]| stdout(&rig(arguments)).to_owned();
+    let text = one(&["montecarlo", "-n", "1"]);
+    assert!(text.starts_with("1 run of deploy, ") && !text.contains("1 runs"), "{text}");
+    let text = one(&["faults", "-n", "1", "--only", "tick overrun"]);
+    assert!(text.starts_with("1 fault at 1 instant each: "), "{text}");
+    assert!(one(&["faults", "--clean", "1"]).starts_with("1 deployment without a fault: 0 false"));
+}
+
+#[test]
 fn the_worst_run_can_be_repeated() {
     let outcome = campaign(&["-n", "2", "--seed", "40"]);
     let seed = outcome["worst_gap_seed"].as_u64().unwrap();

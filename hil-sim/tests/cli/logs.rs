@@ -55,7 +55,7 @@ fn missing_frames_give_exit_code_1_and_a_mark_in_the_log() {
     // Ticks behind the gap cannot be run again, and do not count as equal.
     let output = rig(&["replay", &format!("{out}/log.mcap")]);
     assert_eq!(code(&output), 1);
-    assert!(stdout(&output).contains("1 frames lost"), "{}", stdout(&output));
+    assert!(stdout(&output).contains("1 frame lost"), "{}", stdout(&output));
 }
 
 #[test]

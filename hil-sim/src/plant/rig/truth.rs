@@ -56,7 +56,7 @@ pub struct Truth {
     /// Mechanical work of the drive so far, mJ.
     pub work_mj: f64,
     /// Friction work of creep and slip so far, mJ.
-    pub wear_mj: f64,
+    pub friction_work_mj: f64,
     /// Whether the ring was resolved.
     pub ring_awake: bool,
 }
@@ -139,7 +139,7 @@ impl VirtualRig {
             ("height", t.height_mm),
             ("utilisation", t.utilisation),
             ("slip", t.slip_mm),
-            ("work", t.work_mj + t.wear_mj),
+            ("work", t.work_mj + t.friction_work_mj),
         ];
         // One look at all of them: none finite makes the other finite again.
         if states.iter().map(|(_, value)| value * 0.0).sum::<f64>() == 0.0 {
