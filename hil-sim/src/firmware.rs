@@ -29,6 +29,12 @@ const ID: &str = ".note.gnu.build-id";
 /// The chip's flash, both banks.
 const FLASH: Range<u64> = 0x0800_0000..0x0808_0000;
 
+/// A file of the release that this program is from, which has no source to build it from.
+pub(crate) fn released(name: &str) -> Option<PathBuf> {
+    let file = env::current_exe().ok()?.with_file_name(name);
+    (file.with_file_name("SHA256SUMS").is_file() && file.is_file()).then_some(file)
+}
+
 /// Why an image is not available.
 #[derive(Debug, thiserror::Error)]
 pub enum FirmwareError {

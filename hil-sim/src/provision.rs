@@ -55,9 +55,12 @@ pub enum ProvisionError {
 }
 
 /// Builds this part of `rig` with the tools it needs and returns the binary. A second call
-/// builds nothing and says nothing. Progress and cargo's messages go to standard error.
+/// builds nothing and says nothing, nor does a release that has it. Progress and cargo's messages go to standard error.
 pub fn featured(extra: Extra) -> Result<PathBuf, ProvisionError> {
     let (what, binary, arguments) = extra.build();
+    if let Some(program) = firmware::released(binary) {
+        return Ok(program);
+    }
     let mut cargo = firmware::build_command(arguments);
     cargo.args(["--bin", binary]);
     if extra == Extra::Board {

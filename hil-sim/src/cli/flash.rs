@@ -23,7 +23,8 @@ const PLAIN: [&str; 6] = [
     "no-block-skip",
 ];
 
-/// Builds the firmware, flashes it by the probe, reads it back, and shows its log.
+/// Builds the firmware, or takes the one beside it in a release, flashes it by the probe, reads
+/// it back, and shows its log.
 ///
 /// Needs probe-rs 0.32 or later (`cargo install probe-rs-tools`). Parameters stored on the board
 /// stay.
@@ -56,7 +57,10 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
             "no debug probe is attached: connect the board's ST-LINK by USB",
         ));
     }
-    let elf = firmware::build(Profile::Release)?;
+    let elf = match firmware::released("interstage") {
+        Some(elf) => elf,
+        None => firmware::build(Profile::Release)?,
+    };
     let mut command = Command::new(&program);
     command.args(["run", "--chip", CHIP, "--verify"]).args(PLAIN).args(&args.more).arg(elf);
     let status = command.status().map_err(missing)?;

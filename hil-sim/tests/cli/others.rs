@@ -234,3 +234,63 @@ fn a_file_that_becomes_active_is_asked_for_what_no_default_knows() {
     assert!(restored("all.toml", &all).contains("rig.wheel_radius_mm"), "whose are they?");
     super::refused_in(at, &["params", "get"], &["--target", "--file"]);
 }
+
+/// `hil-sim/release.py` packs what cargo has built; from there `rig` runs the parts beside it and
+/// flashes the image beside it, without cargo.
+#[cfg(unix)]
+#[test]
+fn a_release_runs_and_flashes_without_a_toolchain() {
+    use std::fs;
+    use std::os::unix::fs::PermissionsExt;
+
+    let folder = tempfile::tempdir().expect("a directory");
+    let at = |name: &str| folder.path().join(name);
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+    let python = |arguments: &[&std::ffi::OsStr]| {
+        let mut python = Command::new("python3");
+        let output = python.current_dir(folder.path()).args(arguments).output();
+        output.expect("python3 starts")
+    };
+    let release = root.join("release.py");
+    let pack = || python(&[release.as_ref(), "--target".as_ref(), at("target").as_ref()]);
+    let image = "target/thumbv7em-none-eabihf/release/interstage";
+    for name in [image, "target/debug/rig-probe"] {
+        fs::create_dir_all(at(name).parent().expect("a folder")).expect("folders");
+        fs::write(at(name), "#!/bin/sh\necho beside: \"$@\"\n").expect("a file");
+    }
+    assert!(stderr(&pack()).contains("debug/rig: not there; build it first"));
+    fs::copy(env!("CARGO_BIN_EXE_rig"), at("target/debug/rig")).expect("copied");
+    let packed = pack();
+    assert_eq!(code(&packed), 0, "{}", stderr(&packed));
+    let archive = stdout(&packed).trim().to_owned();
+    let start = concat!("interstage-", env!("CARGO_PKG_VERSION"), "-");
+    assert!(archive.starts_with(start) && archive.ends_with(".tar.gz"), "{archive}");
+    let unpack = ["-m", "tarfile", "-e", &archive].map(std::ffi::OsStr::new);
+    assert_eq!(code(&python(&unpack)), 0);
+    let place = at(archive.trim_end_matches(".tar.gz"));
+    let sums = fs::read_to_string(place.join("SHA256SUMS")).expect("sums");
+    for (line, name) in sums.lines().zip(["rig", "rig-probe", "interstage", "LICENSE-MIT"]) {
+        let sum = sha256(&fs::read(place.join(name)).expect("a file"));
+        assert_eq!(line, format!("{sum}  {name}"));
+    }
+    fs::write(at("probe-rs"), "#!/bin/sh\necho probe-rs 0.32.0 \"$@\"\n").expect("a program");
+    fs::set_permissions(at("probe-rs"), fs::Permissions::from_mode(0o755)).expect("a program");
+    let rig = |arguments: &[&str]| {
+        let mut rig = Command::new(place.join("rig"));
+        let rig = rig.env("PATH", "/usr/bin:/bin").env("CARGO", "/no/cargo");
+        rig.env("PROBE_RS", at("probe-rs")).args(arguments).output().expect("starts")
+    };
+    // A part that needs no probe stands for the one that does.
+    fs::rename(place.join("rig-probe"), place.join("rig-study")).expect("renamed");
+    assert_eq!(stdout(&rig(&["paper"])), "beside: paper\n");
+    let flashed = rig(&["flash"]);
+    let elf = place.canonicalize().expect("there").join("interstage");
+    assert!(stdout(&flashed).trim().ends_with(elf.to_str().unwrap()), "{}", stdout(&flashed));
+}
+
+/// The sum of a file as a release states it.
+#[cfg(unix)]
+fn sha256(bytes: &[u8]) -> String {
+    use sha2::{Digest, Sha256};
+    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
+}
