@@ -2,7 +2,7 @@
 //! that the rising wheel compresses, against the preload sensor.
 //!
 //! `P(t) = seat + slew int lag(duty(t - delay)) dt + spring (height(t) - R)`, as the screw
-//! locks itself while its bridge is off. The height of the centre comes from the fit of
+//! locks itself while its bridge is off. Of a duty it gets what friction leaves of it. The height of the centre comes from the fit of
 //! the contact.
 
 use std::ops::Range;
@@ -23,14 +23,17 @@ pub(crate) const LAG: usize = 1;
 pub(crate) const SLEW: usize = 2;
 /// Spring rate, N/mm by the preload sensor.
 pub(crate) const SPRING: usize = 3;
+/// Part of full duty that friction takes, and each pulse of the bridge that is cut short.
+pub(crate) const LOST: usize = 4;
 /// First of the seats, N, one a log.
-const SEATS: usize = 4;
+const SEATS: usize = 5;
 
 /// Longest dead time, ms.
 const LONGEST_MS: f64 = 250.0;
-/// Changes for the differences: ms, and relative.
+/// Changes for the differences: ms, relative, and of the part that is lost.
 const MOVED_MS: f64 = 0.5;
 const MOVED_LAG: f64 = 0.01;
+const MOVED_LOST: f64 = 1e-3;
 /// Deviation of the first fit, N, and the least of the second.
 const FIRST_N: f64 = 0.1;
 const LEAST_N: f64 = 1e-4;
@@ -59,10 +62,12 @@ struct Log<'a> {
 }
 
 /// Force of the screw's position for a slew of 1 N/s, every tick and one more.
-fn seat(samples: &[Sample], delay: usize, lag_s: f64) -> Vec<f64> {
+fn seat(samples: &[Sample], delay: usize, lag_s: f64, lost: f64) -> Vec<f64> {
     let keep = (-TICK_S / lag_s).exp();
     let (mut rate, mut seat) = (0.0, 0.0);
-    let duty = |s: &Sample| if s.pretightener_on { s.pretightener } else { 0.0 };
+    let left = |duty: f64| ((duty.abs() - lost).max(0.0) / (1.0 - lost)).copysign(duty);
+    let is_driven = |s: &Sample| s.pretightener_on && s.pretightener != 0.0;
+    let duty = |s: &Sample| if is_driven(s) { left(s.pretightener) } else { 0.0 };
     let mut out = Vec::with_capacity(samples.len() + 1);
     out.push(0.0);
     for (n, sample) in samples.iter().enumerate() {
@@ -90,9 +95,10 @@ impl<'a> Log<'a> {
     }
 
     /// The seat for a slew of 1 N/s in the bins, interpolated between two dead times of integer ticks.
-    fn seats(&self, delay_ms: f64, lag_s: f64) -> Vec<f64> {
+    fn seats(&self, delay_ms: f64, lag_s: f64, lost: f64) -> Vec<f64> {
         let ticks = delay_ms.floor();
-        let [early, late] = [0, 1].map(|more| seat(self.samples, ticks as usize + more, lag_s));
+        let [early, late] =
+            [0, 1].map(|more| seat(self.samples, ticks as usize + more, lag_s, lost));
         let part = delay_ms - ticks;
         let mixed: Vec<f64> = early.iter().zip(&late).map(|(a, b)| a + part * (b - a)).collect();
         let mean = |(ticks, _): &(Range<usize>, f64)| {
@@ -126,7 +132,9 @@ impl Model for Screw<'_> {
 
     fn at(&self, x: &[f64]) -> Option<Self::At> {
         let within = (0.0..LONGEST_MS).contains(&x[DELAY]) && x[LAG].abs() < 9.0;
-        within.then(|| self.0.iter().map(|log| log.seats(x[DELAY], x[LAG].exp())).collect())
+        let within = within && x[LOST].abs() < 0.5;
+        let seats = |log: &Log<'_>| log.seats(x[DELAY], x[LAG].exp(), x[LOST]);
+        within.then(|| self.0.iter().map(seats).collect())
     }
 
     fn residuals(&self, x: &[f64], at: &Self::At) -> Vec<f64> {
@@ -140,13 +148,16 @@ impl Model for Screw<'_> {
             let between = |a: Vec<f64>, b: Vec<f64>, over: f64| -> Vec<f64> {
                 a.iter().zip(&b).map(|(a, b)| log.weight * x[SLEW] * (a - b) / over).collect()
             };
-            let (delay, lag) = (x[DELAY], x[LAG].exp());
+            let (delay, lag, lost) = (x[DELAY], x[LAG].exp(), x[LOST]);
             let least = (delay - MOVED_MS).max(0.0);
-            let (later, sooner) = (log.seats(delay + MOVED_MS, lag), log.seats(least, lag));
+            let (later, sooner) =
+                (log.seats(delay + MOVED_MS, lag, lost), log.seats(least, lag, lost));
             columns[DELAY].extend(between(later, sooner, delay + MOVED_MS - least));
             let (up, down) = (lag * MOVED_LAG.exp(), lag * (-MOVED_LAG).exp());
-            let (slower, faster) = (log.seats(delay, up), log.seats(delay, down));
+            let (slower, faster) = (log.seats(delay, up, lost), log.seats(delay, down, lost));
             columns[LAG].extend(between(slower, faster, 2.0 * MOVED_LAG));
+            let [more, less] = [1.0, -1.0].map(|by| log.seats(delay, lag, lost + by * MOVED_LOST));
+            columns[LOST].extend(between(more, less, 2.0 * MOVED_LOST));
             columns[SLEW].extend(at[index].iter().map(|seat| log.weight * seat));
             columns[SPRING].extend(log.rise_mm.iter().map(|rise| log.weight * rise));
             for other in 0..self.0.len() {
@@ -175,6 +186,7 @@ pub fn fit(
         preload.lag_s.ln(),
         preload.slew_n_per_s,
         preload.spring_n_per_mm,
+        0.0,
     ];
     // Where the screw is before it first moves.
     start.extend(runs.iter().map(|run| run.traces.preload_n[run.traces.span.start]));
@@ -204,6 +216,7 @@ mod tests {
         #[test]
         fn the_seat_is_the_plants(
             delay in 0usize..150, lag in 0.01f64..0.2, slew in 5.0f64..80.0, at in 100usize..400,
+            lost in 0.0f64..0.3,
         ) {
             let sample = |n: usize| Sample {
                 pretightener: if n < at { 0.8 } else { -0.5 },
@@ -213,8 +226,9 @@ mod tests {
             let samples: Vec<Sample> = (0..600).map(sample).collect();
             let range = (-1e6, 1e6);
             let mut screw =
-                Pretightener::new(slew, lag, delay as f64 * TICK_S, TICK_S, 0.0, range);
-            let seats = seat(&samples, delay, lag);
+                Pretightener::new(slew, lag, delay as f64 * TICK_S, TICK_S, 0.0, range)
+                    .with_losses(0.0, lost, 1.0);
+            let seats = seat(&samples, delay, lag, lost);
             for (n, sample) in samples.iter().enumerate() {
                 prop_assert!((slew * seats[n] - screw.seat_n()).abs() < 1e-9, "{n}");
                 screw.step(sample.pretightener, sample.pretightener_on, 0.0, TICK_S);

@@ -36,9 +36,11 @@ pub(crate) const ARM_ZERO: usize = 9;
 pub(crate) const CREEP: usize = 10;
 /// Force of the drive over nominal, logarithm.
 pub const DRIVE: usize = 11;
+/// No-load speed of the drive over the stated one, logarithm.
+pub(crate) const NO_LOAD: usize = 12;
 /// First of the steps: all positions as the wheel's turn has them at its nominal radius,
 /// mm, so that a wheel of another radius meets them at the same turn; then all heights, mm.
-pub const STEPS: usize = 12;
+pub const STEPS: usize = 13;
 
 /// Deviation of what only the logs can show: a factor of two (one standard
 /// deviation), and lengths, forces and angles beyond any tolerance.
@@ -47,9 +49,10 @@ const UNKNOWN_GEARBOX_N: f64 = 10.0;
 const UNKNOWN_ARM_MRAD: f64 = 10.0;
 const UNKNOWN_POSITION_MM: f64 = 3.0;
 const UNKNOWN_HEIGHT_MM: f64 = 0.5;
-/// What a data sheet leaves open of the drive's force, and what is left open of the creep
-/// law, relative: no scenario states them.
+/// What a data sheet leaves open of the drive's force, what the first power-up leaves open of its
+/// speed, and what is left open of the creep law, relative: no scenario states them.
 const DRIVE_REL: f64 = 0.01;
+const NO_LOAD_REL: f64 = 0.025;
 const CREEP_REL: f64 = 0.05;
 /// Deviation of where a run begins that an earlier one has ended, mm: a run arrives within 0.5.
 const START_MM: f64 = 0.25;
@@ -108,6 +111,7 @@ impl Coordinates {
             free(0.0, UNKNOWN_ARM_MRAD),
             known(nominal.elastic_creep.ln(), CREEP_REL),
             known(0.0, DRIVE_REL),
+            known(0.0, NO_LOAD_REL),
         ];
         let all = nominal.wall.steps().iter();
         priors.extend(all.clone().map(|step| free(step.position_mm, UNKNOWN_POSITION_MM)));
@@ -224,7 +228,7 @@ mod tests {
         let worn = nominal.ring.radius_mm - plant.ring.radius_mm;
         assert!((worn - 0.5 * scenario.spread.wear_mm).abs() < 1e-12);
         assert_eq!(means.len(), STEPS + 6);
-        assert_eq!((coordinates.position(2), coordinates.height(2)), (14, 17));
+        assert_eq!((coordinates.position(2), coordinates.height(2)), (15, 18));
     }
 
     #[test]

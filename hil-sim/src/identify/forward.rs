@@ -1,40 +1,37 @@
 //! The forward model: the plant's ring follows a log's wheel rotation and preload. It
-//! gives the compression, the height of the centre and the traction that such a tread
+//! gives the compression, the height of the centre and the load on the drive that such a tread
 //! would have shown.
 //!
 //! Motor and pre-tightener are no part of it, so their errors do not accumulate over the
-//! travel. Derivatives are central differences of simulations. A step acts only near
-//! itself, so one pair of simulations with all steps moved gives the derivatives by each.
+//! travel. Derivatives are central differences of simulations.
 
+use std::f64::consts::PI;
 use std::ops::Range;
 
 use rayon::prelude::*;
 
 use super::coordinates::{
-    ARM_ZERO, CREEP, Coordinates, DRIVE, FRICTION, GEARBOX, LOAD, LOAD_GAIN, RADIUS, STIFFENING,
-    STIFFNESS, TAU, TREAD_GAIN,
+    ARM_ZERO, CREEP, Coordinates, DRIVE, FRICTION, GEARBOX, LOAD, LOAD_GAIN, NO_LOAD, RADIUS,
+    STIFFENING, STIFFNESS, TAU, TREAD_GAIN,
 };
 use super::record::{Record, TICK_S};
 use super::traces::{Bin, Effort, Traces, at};
 use crate::plant::draw::PlantParameters;
 use crate::plant::rig::{PlantError, VirtualRig};
-use crate::plant::wall::touch_mm;
 
 /// Step of the forward model, ticks.
 const STEP: usize = 2;
 
-/// Series of a [`Trajectory`]: compression, mm, height of the centre, mm, traction, N,
-/// and position, mm.
+/// Series of a [`Trajectory`]: compression, mm, height of the centre, mm, load on the drive, N.
 const COMPRESSION: usize = 0;
 const HEIGHT: usize = 1;
-const TRACTION: usize = 2;
-const POSITION: usize = 3;
+const DRIVE_LOAD: usize = 2;
 
 /// What the forward model gives, every few ticks, or a change of it.
 #[derive(Clone, Debug)]
 pub struct Trajectory {
     first: usize,
-    series: [Vec<f64>; 4],
+    series: [Vec<f64>; 3],
     /// Largest friction utilisation.
     pub most_utilisation: f64,
     /// Number of each step crossed, from 1, and its gap, mm.
@@ -107,7 +104,7 @@ impl Run {
             rig = rig.with_speed(0.0);
         }
         let count = (last - first) / STEP + 1;
-        let series = [(); 4].map(|()| Vec::with_capacity(count));
+        let series = [(); 3].map(|()| Vec::with_capacity(count));
         let mut trajectory =
             Trajectory { first, series, most_utilisation: 0.0, gaps_mm: Vec::new() };
         trajectory.note(&rig);
@@ -134,10 +131,11 @@ impl Run {
         let effort = |bin: &Effort| {
             let direction = bin.turn_rad_s.signum();
             // The worm gear holds a load along the motion.
-            let traction = of.mean(TRACTION, &bin.ticks, 0.0) * direction;
+            let load = of.mean(DRIVE_LOAD, &bin.ticks, 0.0) * direction;
             let inertia = 1e-3 * plant.drive.mass_kg * bin.gain_rad_s2 * radius;
-            let loss = plant.drive.stall_n * bin.turn_rad_s * radius / plant.drive.no_load_mm_s;
-            let force = direction * (traction.max(0.0) + x[GEARBOX]) + inertia;
+            let no_load_mm_s = plant.drive.no_load_mm_s * x[NO_LOAD].exp();
+            let loss = plant.drive.stall_n * bin.turn_rad_s * radius / no_load_mm_s;
+            let force = direction * (load.max(0.0) + x[GEARBOX]) + inertia;
             force / x[DRIVE].exp() + loss
         };
         self.used(compression, arm, effort)
@@ -175,7 +173,7 @@ impl Run {
 impl Trajectory {
     fn note(&mut self, rig: &VirtualRig) {
         let truth = rig.truth();
-        let now = [truth.depth_mm, truth.height_mm, rig.traction_n(), truth.position_mm];
+        let now = [truth.depth_mm, truth.height_mm, rig.tread_load_n()];
         self.series.iter_mut().zip(now).for_each(|(series, value)| series.push(value));
         self.most_utilisation = self.most_utilisation.max(truth.utilisation.abs());
     }
@@ -209,24 +207,18 @@ impl Trajectory {
 }
 
 /// Coordinates by which simulations are differenced, and by how much to either side: so
-/// far that the ring's elements, which meet a corner one by one, do not show.
+/// far that the ring's elements, which meet a corner one by one, show little.
 const MOVED: [(usize, f64); 7] = [
     (STIFFNESS, 0.01),
     (STIFFENING, 0.01),
     (TAU, 0.02),
-    (FRICTION, 0.03),
+    (FRICTION, 0.1),
     (LOAD, 0.02),
-    (RADIUS, 0.04),
+    (RADIUS, 0.08),
     (CREEP, 0.05),
 ];
-/// By how much the steps are moved, mm, in position and height.
-const MOVED_STEPS_MM: f64 = 0.03;
-
-/// How far before its face a corner acts, parts of the distance at which an undeformed wheel
-/// touches it, and the part of the rest between two steps that belongs to the first, whose edge
-/// the patch has to leave.
-const CORNER: f64 = 1.07;
-const PART_OF_CLEAR: f64 = 0.8;
+/// By how much friction is moved at least, logarithm.
+const LEAST_MOVED: f64 = 0.01;
 
 /// Trajectories of all runs at these coordinates.
 pub(crate) fn simulate(
@@ -244,18 +236,24 @@ pub(crate) fn derivatives(
     x: &[f64],
     base: &Trajectory,
 ) -> Result<Vec<Channels>, PlantError> {
-    let steps = 0..coordinates.steps();
-    let mut moves: Vec<(Vec<usize>, f64)> =
-        MOVED.iter().map(|&(index, by)| (vec![index], by)).collect();
-    moves.push((steps.clone().map(|s| coordinates.position(s)).collect(), MOVED_STEPS_MM));
-    moves.push((steps.map(|step| coordinates.height(step)).collect(), MOVED_STEPS_MM));
-    let difference = |(indices, by): &(Vec<usize>, f64)| {
+    // Steps and starts by half an element, so that elements meet the corner alike on either side.
+    let ring = &coordinates.nominal().ring;
+    let by_mm = PI * ring.radius_mm / ring.elements as f64;
+    let places = coordinates.of_steps().chain(run.start).map(|index| (index, by_mm));
+    // Friction by half of what keeps the wheel from slipping at most.
+    let room = 0.5 * (x[FRICTION].exp() / base.most_utilisation).ln();
+    let moved = MOVED.map(|(index, by)| {
+        let most = if index == FRICTION { room.max(LEAST_MOVED) } else { by };
+        (index, by.min(most))
+    });
+    let moves: Vec<(usize, f64)> = moved.into_iter().chain(places).collect();
+    let difference = |&(index, by): &(usize, f64)| {
         let moved = |by: f64| {
             let mut x = x.to_vec();
-            indices.iter().for_each(|&index| x[index] += by);
+            x[index] += by;
             run.simulate(coordinates, &x)
         };
-        let (up, down) = (moved(*by)?, moved(-by)?);
+        let (up, down) = (moved(by)?, moved(-by)?);
         let factor = 1.0 / (2.0 * by);
         Ok(up.map(|i, k, value| (value - down.series[i][k]) * factor))
     };
@@ -273,66 +271,22 @@ pub(crate) fn derivatives(
         moved[index] += by;
         quotient(&run.predicted(base, &moved), &predicted, by)
     };
-    let none = quotient(&predicted, &predicted, 1.0);
-    let mut columns = vec![none.clone(); x.len()];
-    for (&(index, _), change) in MOVED.iter().zip(&changes) {
+    let mut columns = vec![quotient(&predicted, &predicted, 1.0); x.len()];
+    for (&(index, _), change) in moves.iter().zip(&changes) {
         columns[index] = by_change(change);
     }
     // The drive's effort depends on the radius, too.
     columns[RADIUS] = combined(&columns[RADIUS], &by_sensors(RADIUS, 1e-3), |a, b| a + b);
-    for index in [GEARBOX, TREAD_GAIN, ARM_ZERO, DRIVE] {
+    for index in [GEARBOX, TREAD_GAIN, ARM_ZERO, DRIVE, NO_LOAD] {
         columns[index] = by_sensors(index, 1e-4);
     }
     // All forces scaled alike change no geometry: a preload sensor that reads high is a
     // stiffer tread under a larger load, its forces taken too large.
     let (stiffer, loaded) = (&changes[0], &changes[4]);
     let mut scaled = stiffer.plus(loaded, 1.0);
-    for (change, traction) in scaled.series[TRACTION].iter_mut().zip(&base.series[TRACTION]) {
-        *change -= traction;
+    for (change, load) in scaled.series[DRIVE_LOAD].iter_mut().zip(&base.series[DRIVE_LOAD]) {
+        *change -= load;
     }
     columns[LOAD_GAIN] = by_change(&scaled);
-    step_columns(coordinates, x, base, &changes[MOVED.len()..], &mut columns, by_change);
-    if let Some(start) = run.start {
-        // A wheel further out meets every step earlier.
-        let faces = (0..coordinates.steps()).map(|step| &columns[coordinates.position(step)]);
-        let less =
-            |sum: Channels, of| combined(&sum, of, |sum, of| sum - of / coordinates.scale(x));
-        columns[start] = faces.fold(none, less);
-    }
     Ok(columns)
-}
-
-fn step_columns(
-    coordinates: &Coordinates,
-    x: &[f64],
-    base: &Trajectory,
-    changes: &[Trajectory],
-    columns: &mut [Channels],
-    by_change: impl Fn(&Trajectory) -> Channels,
-) {
-    let (steps, scale) = (coordinates.steps(), coordinates.scale(x));
-    let faces: Vec<f64> = (0..steps).map(|step| scale * x[coordinates.position(step)]).collect();
-    // Whether a wheel has left a step behind: past its face by most of what is left to the
-    // corner of the next.
-    let is_behind = |k: usize, step: usize| {
-        let corner = |step| CORNER * touch_mm(x[RADIUS], x[coordinates.height(step)]);
-        let clear = |next: &f64| PART_OF_CLEAR * (next - faces[step] - corner(step + 1)).max(0.0);
-        let past = |next: &f64| base.series[POSITION][k] > faces[step] + clear(next);
-        faces.get(step + 1).is_some_and(past)
-    };
-    // The part of a change that belongs to a step.
-    let belongs =
-        |k: usize, step: usize| (step == 0 || is_behind(k, step - 1)) && !is_behind(k, step);
-    // Heights add up over the travel: each step alone, above the wall before it.
-    let lower = |k: usize| (0..steps).filter(|&step| is_behind(k, step)).count() as f64;
-    let by_height = changes[1].map(|i, k, v| if i == HEIGHT { v - lower(k) } else { v });
-    for step in 0..steps {
-        let part = |k: usize, value: f64| if belongs(k, step) { value } else { 0.0 };
-        columns[coordinates.position(step)] =
-            by_change(&changes[0].map(|_, k, value| part(k, value)));
-        columns[coordinates.height(step)] = by_change(&by_height.map(|i, k, value| {
-            let raised = i == HEIGHT && is_behind(k, step);
-            part(k, value) + if raised { 1.0 } else { 0.0 }
-        }));
-    }
 }

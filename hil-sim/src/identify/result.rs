@@ -11,8 +11,8 @@ use super::IdentifyError;
 use super::actuator::{self, Actuator};
 use super::contact::{self, Contact};
 use super::coordinates::{
-    ARM_ZERO, CREEP, Coordinates, DRIVE, FRICTION, GEARBOX, LOAD, LOAD_GAIN, RADIUS, STIFFENING,
-    STIFFNESS, TAU, TREAD_GAIN,
+    ARM_ZERO, CREEP, Coordinates, DRIVE, FRICTION, GEARBOX, LOAD, LOAD_GAIN, NO_LOAD, RADIUS,
+    STIFFENING, STIFFNESS, TAU, TREAD_GAIN,
 };
 use super::forward::{CHANNELS, Run};
 use super::least_squares::Noise;
@@ -155,7 +155,9 @@ pub(super) fn fitted(
     let runs: Vec<Run> = records.iter().map(run).collect::<Result<_, _>>()?;
     let contact = contact::fit(&runs, &coordinates)?;
     let actuator = actuator::fit(records, &runs, &contact.trajectories, contact.x[RADIUS])?;
-    let report = Document { scenario, coordinates: &coordinates, runs: &runs, contact: &contact };
+    let lost = actuator.x[actuator::LOST];
+    let report =
+        Document { scenario, coordinates: &coordinates, runs: &runs, contact: &contact, lost };
     let mut parameters = report.contact_parameters();
     parameters.extend(report.actuator_parameters(&actuator));
     parameters.extend(report.zeros());
@@ -183,6 +185,8 @@ struct Document<'a> {
     coordinates: &'a Coordinates,
     runs: &'a [Run],
     contact: &'a Contact,
+    /// Part of full duty that a bridge loses.
+    lost: f64,
 }
 
 /// A coordinate as a parameter: its index, name, unit and evidence.
@@ -192,7 +196,9 @@ impl Document<'_> {
     /// The parameter of a coordinate: `of` takes it to the parameter's own unit.
     fn parameter(&self, (index, name, unit, by): Shown<'_>, of: &dyn Fn(f64) -> f64) -> Parameter {
         let (x, prior) = (self.contact.x[index], self.coordinates.priors()[index]);
-        let deviation = self.contact.covariance[(index, index)].sqrt();
+        // A bridge cuts some pulses short, at full duty none: the drive's as the pre-tightener's.
+        let cut = if index == NO_LOAD { self.lost } else { 0.0 };
+        let deviation = self.contact.covariance[(index, index)].sqrt().hypot(cut);
         let ends = [of(x - NORMAL_95 * deviation), of(x + NORMAL_95 * deviation)];
         let leaves = if prior.tolerance { LEAVES.1 } else { LEAVES.0 };
         let identified = deviation < leaves * prior.deviation;
@@ -214,7 +220,9 @@ impl Document<'_> {
         let rolling = "compression at rest and rolling";
         let speeds = "compression and lift at several speeds";
         let arm_zero = |mrad: f64| zero_code + 16_384.0 * 1e-3 * mrad / TURN;
-        let all: [(Shown<'_>, &dyn Fn(f64) -> f64); 12] = [
+        let no_load_mm_s = rig.drive.no_load_speed_mm_s;
+        let no_load = |x: f64| no_load_mm_s * x.exp();
+        let all: [(Shown<'_>, &dyn Fn(f64) -> f64); 13] = [
             ((STIFFNESS, "tread.k_inf_pa_per_m", "Pa/m", pressed), &|x| 1e9 * x.exp()),
             ((STIFFENING, "tread.stiffening", "", rolling), &f64::exp),
             ((TAU, "tread.tau_s", "s", speeds), &f64::exp),
@@ -226,6 +234,7 @@ impl Document<'_> {
             ((TREAD_GAIN, "compression sensor gain", "", "compression against the arm"), &f64::exp),
             ((CREEP, "plant.elastic_creep", "", "creep at the climbs"), &f64::exp),
             ((DRIVE, "drive force over nominal", "", "effort against load"), &f64::exp),
+            ((NO_LOAD, "drive.no_load_speed_mm_s", "mm/s", "effort against speed"), &no_load),
             ((ARM_ZERO, "sense.angle_zero_code", "codes", "arm angle at known radii"), &arm_zero),
         ];
         let mut list: Vec<Parameter> =
@@ -278,6 +287,7 @@ impl Document<'_> {
             of("preload.lag_s", "s", lag[0], [lag[1], lag[2]]),
             scaled("preload.slew_n_per_s", "N/s", actuator::SLEW),
             scaled("preload.spring_n_per_mm", "N/mm", actuator::SPRING),
+            around("pre-tightener friction", "", self.lost, variance(actuator::LOST).sqrt()),
         ]
     }
 

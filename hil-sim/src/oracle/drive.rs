@@ -145,7 +145,7 @@ impl Driven {
         let kept = (-1000.0 / p.mass_kg * p.stall_n / p.no_load_mm_s * TICK_S).exp();
         let settled = (sign * self.motion.speed - kept * truth.tread_mm_s) / (1.0 - kept);
         // A load along the motion does not help the worm.
-        let load = sign * (sign * self.plant.traction_n()).max(0.0) + sign * p.friction_n;
+        let load = sign * (sign * self.plant.tread_load_n()).max(0.0) + sign * p.friction_n;
         (settled / p.no_load_mm_s + load / p.stall_n).clamp(-1.0, 1.0)
     }
 

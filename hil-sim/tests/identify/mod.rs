@@ -153,7 +153,7 @@ fn a_log_that_lacks_something_is_identified_with_a_word_and_exit_code_1() {
     std::fs::write(at.join("lossy.csv"), lossy.join("\n") + "\n").unwrap();
     let described = std::fs::read(at.join("run/log.csv-metadata.json")).unwrap();
     std::fs::write(at.join("lossy.csv-metadata.json"), described).unwrap();
-    for (log, what) in [("cut.mcap", "cut off"), ("lossy.csv", "1 ticks are missing")] {
+    for (log, what) in [("cut.mcap", "cut off"), ("lossy.csv", "1 tick missing")] {
         let output = rig_in(at, &["identify", log, "--json"]);
         assert_eq!(code(&output), 1, "{log}: {}", stderr(&output));
         let notes = object(&output)["notes"].to_string();

@@ -118,7 +118,7 @@ fn taper_and_bend_move_the_arm_and_the_taper_has_to_be_climbed() {
         let mut rig = VirtualRig::new(plant, 0.0, 33.3, TICK_S);
         roll(&mut rig, 10.0, 80.0, 20.0, |rig| {
             let truth = rig.truth();
-            rows.push((truth.position_mm, truth.radius_mm, rig.traction_n()));
+            rows.push((truth.position_mm, truth.radius_mm, rig.tread_load_n()));
         })
         .unwrap();
         move |at: f64| *rows.iter().find(|row| row.0 > at).unwrap()
@@ -159,7 +159,7 @@ fn what_moves_has_a_weight() {
         let mut rig =
             VirtualRig::new(smooth(Mismatch { weight_n, ..neutral() }), 0.0, 33.3, TICK_S);
         roll(&mut rig, 8.0, 60.0, 20.0, |_| ()).unwrap();
-        rig.traction_n()
+        rig.tread_load_n()
     };
     close(traction(5.0) - traction(0.0), 5.0, 0.01);
 }

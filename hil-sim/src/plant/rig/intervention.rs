@@ -24,9 +24,9 @@ impl VirtualRig {
         self.check()
     }
 
-    /// Traction of the tread, N: the load of the drive.
-    pub fn traction_n(&self) -> f64 {
-        self.truth.utilisation * self.forces.0
+    /// Load of the drive at the tread, N, signed as its speed: traction, and what rolling takes.
+    pub const fn tread_load_n(&self) -> f64 {
+        self.tread_load_n
     }
 
     /// Mean friction of tread on wall becomes this.
