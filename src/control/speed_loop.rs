@@ -14,11 +14,6 @@ const FULL: Ratio = q16(1_000_000);
 /// Most that the integral part may contribute, duty.
 const INTEGRAL_LIMIT: Ratio = q16(500_000);
 
-/// What a wheel lacks, over what its measured error shows while the load rises: the measured
-/// speed and the drive lag behind. Chosen by the nominal crossings, which stay as fast as without
-/// handing over.
-const LAGS: Ratio = q16(2_500_000);
-
 /// Gains.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct SpeedLoop {
@@ -51,8 +46,8 @@ impl SpeedLoop {
         })
     }
 
-    /// Of a load this part is fed forward from now on. The integral part yields as much, but for
-    /// what the wheel still lacks by its error, mm/s: it has carried the load so far.
+    /// Of a load this part is fed forward from now on. The integral part yields as much: it has
+    /// carried the load so far, but for what the wheel's error, mm/s, and the proportional part do.
     pub fn hand_over(
         &self,
         state: &mut SpeedLoopState,
@@ -61,7 +56,7 @@ impl SpeedLoop {
         error: MillimetresPerSecond,
     ) {
         let whole = self.forward(load);
-        let lacks = error * self.per_speed * LAGS;
+        let lacks = error * (self.per_speed + self.proportional);
         let lacks = between(lacks, whole.min(Q16::ZERO), whole.max(Q16::ZERO));
         let limit = INTEGRAL_LIMIT.widen();
         state.integral =
@@ -185,7 +180,8 @@ mod tests {
             let (change, forward) = handed(load, 50.0 * load.signum());
             assert!((change - forward).abs() < 1e-3 && forward.abs() > 0.07);
             let (change, _) = handed(load, 0.6 * load.signum());
-            assert!((change.abs() - 0.025).abs() < 1e-3, "{change}");
+            let lacks = 0.6 * (1.0 + PROPORTIONAL) / Rig::prototype().drive.no_load_speed_mm_s;
+            assert!((change.abs() - lacks).abs() < 1e-3, "{change}");
         }
     }
 
