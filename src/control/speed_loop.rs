@@ -14,6 +14,11 @@ const FULL: Ratio = q16(1_000_000);
 /// Most that the integral part may contribute, duty.
 const INTEGRAL_LIMIT: Ratio = q16(500_000);
 
+/// What a wheel lacks, over what its measured error shows while the load rises: the motor and the
+/// proportional part make 1.3; the rest, for a measured speed that lags behind, has no derivation.
+/// With 1.3 the plant deploys as fast, but 7 % slower at a friction of 0.8.
+const LAGS: Ratio = q16(2_500_000);
+
 /// Gains.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct SpeedLoop {
@@ -46,8 +51,8 @@ impl SpeedLoop {
         })
     }
 
-    /// Of a load this part is fed forward from now on. The integral part yields as much: it has
-    /// carried the load so far, but for what the wheel's error, mm/s, and the proportional part do.
+    /// Of a load this part is fed forward from now on. The integral part yields as much, but for
+    /// what the wheel still lacks by its error, mm/s: it has carried the load so far.
     pub fn hand_over(
         &self,
         state: &mut SpeedLoopState,
@@ -56,7 +61,7 @@ impl SpeedLoop {
         error: MillimetresPerSecond,
     ) {
         let whole = self.forward(load);
-        let lacks = error * (self.per_speed + self.proportional);
+        let lacks = error * self.per_speed * LAGS;
         let lacks = between(lacks, whole.min(Q16::ZERO), whole.max(Q16::ZERO));
         let limit = INTEGRAL_LIMIT.widen();
         state.integral =
@@ -180,8 +185,7 @@ mod tests {
             let (change, forward) = handed(load, 50.0 * load.signum());
             assert!((change - forward).abs() < 1e-3 && forward.abs() > 0.07);
             let (change, _) = handed(load, 0.6 * load.signum());
-            let lacks = 0.6 * (1.0 + PROPORTIONAL) / Rig::prototype().drive.no_load_speed_mm_s;
-            assert!((change.abs() - lacks).abs() < 1e-3, "{change}");
+            assert!((change.abs() - 0.025).abs() < 1e-3, "{change}");
         }
     }
 

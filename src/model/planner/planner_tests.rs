@@ -233,13 +233,12 @@ fn a_stiffer_tread_and_less_preload_are_crossed_slower() {
 }
 
 #[test]
-fn a_search_that_no_speed_suits_is_at_the_safe_speed_if_the_tread_is_not_as_known() {
+fn a_search_that_no_speed_suits_is_at_the_safe_speed() {
     let planner = planner();
-    let [known, searching] = [false, true].map(|unknown| {
-        let learned = Learned { scale: q16(1_500_000), unknown, ..Learned::default() };
+    let learned = Learned { scale: q16(1_500_000), ..Learned::default() };
+    let [known, searching] = [false, true].map(|searching| {
         let distance = q16(18_000_000);
-        let request =
-            PlanRequest { learned, distance, searching: true, ..request(Direction::Retract) };
+        let request = PlanRequest { learned, distance, searching, ..request(Direction::Retract) };
         planner.plan(&request)
     });
     assert!(known.gap > planner.aimed[1], "{known:?}");

@@ -50,8 +50,6 @@ pub(super) struct Search<'a, P> {
     /// The wheel speeds up again before it lifts off.
     releases: bool,
     searching: bool,
-    /// The tread is not as known.
-    unknown: bool,
     /// The slowest speed that met the gap last.
     guess: MillimetresPerSecond,
     /// Time that a wider gap saves, s/mm.
@@ -83,7 +81,6 @@ impl<'a, P: AsyncFnMut()> Search<'a, P> {
                 && !request.learned.unknown
                 && planner.prescribed_speed.is_none(),
             searching: request.searching,
-            unknown: request.learned.unknown,
             guess: ceiling,
             per_gap: q16(-1_500_000),
         }
@@ -234,7 +231,7 @@ impl<'a, P: AsyncFnMut()> Search<'a, P> {
     }
 
     /// The course, or a slower one if the margin that it saves is worth its time. Where none keeps the
-    /// gap, a search with a tread that is not as known is no slower than the reference's safe speed.
+    /// gap, a search is no slower than the safe speed, whose gap is the reference.
     async fn gripping(
         &mut self,
         window: MillimetresPerSecond,
@@ -242,7 +239,7 @@ impl<'a, P: AsyncFnMut()> Search<'a, P> {
         course: Course,
     ) -> Course {
         let mut best = course;
-        if !self.fits(&course.rolled) && self.searching && self.unknown {
+        if !self.fits(&course.rolled) && self.searching {
             let safe = between(self.planner.safe_speed, self.floor, self.ceiling);
             best = self.roll(window.max(safe), release, safe).await;
         } else if self.price(&course.rolled) > Q16::ZERO {
