@@ -14,9 +14,9 @@ const FULL: Ratio = q16(1_000_000);
 /// Most that the integral part may contribute, duty.
 const INTEGRAL_LIMIT: Ratio = q16(500_000);
 
-/// What a wheel lacks, over what its measured error shows while the load rises: the measured
-/// speed and the drive lag behind. Chosen by the nominal crossings, which stay as fast as without
-/// handing over.
+/// What a wheel lacks, over what its measured error shows while the load rises: the motor and the
+/// proportional part make 1.3; the rest, for a measured speed that lags behind, has no derivation.
+/// With 1.3 the plant deploys as fast, but 7 % slower at a friction of 0.8.
 const LAGS: Ratio = q16(2_500_000);
 
 /// Gains.

@@ -12,6 +12,7 @@
 #![deny(clippy::float_arithmetic)]
 
 use crate::model::corner_profile::CornerProfile;
+use crate::model::planner::KNOWN_SCALE;
 use crate::numeric::{LowPass, LowPassState, checked, divide, sqrt};
 use crate::rig::{Rig, RigError};
 use crate::units::{
@@ -19,10 +20,10 @@ use crate::units::{
     ticks_to_seconds,
 };
 
-/// Part of the load that the compression may show too much or too little. Rubber that is off
-/// by three deviations of 4 % makes 0.13, gains of both sensors 0.03, the noise of what they
-/// zeroed 0.01; the worst of the random rigs is 0.17.
-const BAND: Ratio = q16(220_000);
+/// Part of the load that the compression may show too much or too little: rubber off by three
+/// deviations of 4 %, both sensors' gains by three of 0.5 %, `1.015^1.5 / (0.88 * 0.985)`, and the
+/// noise of what they zeroed, 0.01.
+const BAND: Ratio = q16(190_000);
 /// Least preload at which it is compared, part of the cruise preload: the wheel rolls from about
 /// 0.4 of it on.
 const LEAST_PART: f64 = 0.3;
@@ -31,19 +32,12 @@ const FORGETS: u16 = 300;
 /// Ticks that it must be off.
 const OFF_TICKS: u16 = 50;
 
-/// Ratio of both loads at rest over rolling up to which the tread is as known: three deviations
-/// of random rigs, 0.99 +- 0.012; and by how much a crossing is stiffer per ratio beyond that. Fitted
-/// to 160 rigs drawn from the wide ranges: the stiffness that the first crossing shows grows with
-/// the power 2.6 of the ratio, +- 24 %; too stiff a guess only costs time.
+/// Ratio of both loads at rest over rolling up to which the tread is as known, and by how much a
+/// crossing is stiffer per ratio beyond that. Fitted, without a derivation: on 160 virtual rigs with
+/// a bonded tread the stiffness that the first crossing shows grows with the power 2.6 of the ratio,
+/// +- 24 %. Four, because too stiff a guess only costs time. A real tread has to show it.
 const RATIO_WITHIN: Ratio = q16(1_030_000);
 const PER_RATIO: Q16 = q16(4_000_000);
-/// Load of the rolling tread over the known one below which it is softer than rubber and sensors
-/// within their tolerances make it, and as how stiff it then counts at least: it has shown that
-/// it is not as known, and the first crossing of such rigs opens the gap the widest.
-const SOFT: Ratio = q16(900_000);
-const SOFT_AS: Ratio = q16(1_160_000);
-/// The same above which it is stiffer than known by as much; below, it may be the sensors.
-const STIFF: Ratio = q16(1_030_000);
 
 /// Load at rest of a tread as known over the load that its compression means, as a difference
 /// from 1: three deviations of its stiffness, of 4 %.
@@ -58,10 +52,12 @@ const AHEAD: usize = 19;
 /// Where the rolling tread is observed, over the wheel's radius.
 const ROLLING: [f64; 2] = [0.03, 0.12];
 /// Coulomb friction of the gearbox, and one sigma of the load that the drive shows, as parts of the
-/// stall force: friction of the gearbox to a tenth, supply of the bridge to 0.6 %, rolling loss of
-/// a tread as far from the known one as the random rigs'.
+/// stall force: that friction to a tenth, and the supply of the bridge to 0.6 % of a duty of 0.25.
 const GEARBOX: f64 = 0.02;
-const LOAD_SIGMA: f64 = 0.005;
+const LOAD_SIGMA: f64 = 0.0025;
+/// The same as a part of the rolling loss: of an unknown relaxation it is anything from none to
+/// twice what the compression means, evenly spread.
+const LOSS_SIGMA: Ratio = q16(577_000);
 
 /// A sum counts 1/256 of its terms, so that a second of 1,000 N fits.
 const LONGEST: u16 = 4096;
@@ -194,13 +190,10 @@ impl Shown {
         let rolled = self.rolled_under(thrust);
         let beyond = divide(self.rest, rolled) - RATIO_WITHIN;
         let coupled = Ratio::ONE + beyond.max(Q16::ZERO) * PER_RATIO;
-        if rolled < SOFT {
-            coupled.max(SOFT_AS + SOFT - rolled)
-        } else if rolled > STIFF {
-            coupled.max(rolled)
-        } else {
-            coupled
-        }
+        // A tread that is too soft is not as known, either: it may be as far off on a corner.
+        let off = rolled - Ratio::ONE;
+        let soft = -off > KNOWN_SCALE - Ratio::ONE;
+        coupled.max(Ratio::ONE + if soft { -off } else { off })
     }
 }
 
@@ -336,25 +329,36 @@ impl Tread {
         state.rises = false;
         let seen = state.rest.ticks > OFF_TICKS && state.rolled.ticks > OFF_TICKS;
         let ticks = Q16::from_bits(i32::from(state.rolled.ticks) << 8);
+        let (load, loss) = self.axial(&state.drive, rolled, tick);
         seen.then(|| Shown {
             rest: state.rest.ratio(),
             rolled: state.rolled.ratio(),
             pressed: divide(state.rolled.measured, ticks),
-            load: self.axial(&state.drive, rolled, tick),
-            load_sigma: self.load_sigma,
+            load,
+            load_sigma: self.load_sigma + loss * LOSS_SIGMA,
         })
     }
 
-    /// Axial load, N, by the drive's mean effort since it is watched: what its duty is beyond that of
-    /// its speed, less acceleration, friction of the gearbox and rolling resistance.
-    fn axial(&self, drive: &DriveSums, rolled: Millimetres, tick: &Rolls) -> Option<Newtons> {
-        let (from, speed) = drive.from.filter(|_| tick.direction == Direction::Deploy)?;
+    /// Axial load and rolling resistance, N. The load, by the drive's mean effort since it is watched,
+    /// is what its duty is beyond that of its speed, less acceleration, friction of the gearbox and that
+    /// resistance.
+    fn axial(
+        &self,
+        drive: &DriveSums,
+        rolled: Millimetres,
+        tick: &Rolls,
+    ) -> (Option<Newtons>, Newtons) {
         let ticks = Q16::from_num(drive.ticks);
-        let seconds = ticks_to_seconds(u32::from(drive.ticks));
-        let duty = divide(drive.duty, ticks) - divide(rolled - from, seconds) * self.per_speed;
-        let accelerates = self.inertia * divide(tick.speed - speed, seconds);
         let resistance = divide(drive.resistance, Q16::from_bits(ticks.to_bits() >> 8));
-        Some(self.stall * duty - accelerates - self.gearbox - resistance)
+        let load =
+            drive.from.filter(|_| tick.direction == Direction::Deploy).map(|(from, speed)| {
+                let seconds = ticks_to_seconds(u32::from(drive.ticks));
+                let duty =
+                    divide(drive.duty, ticks) - divide(rolled - from, seconds) * self.per_speed;
+                let accelerates = self.inertia * divide(tick.speed - speed, seconds);
+                self.stall * duty - accelerates - self.gearbox - resistance
+            });
+        (load, resistance)
     }
 
     /// Depth of an element, mm.

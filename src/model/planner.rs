@@ -29,16 +29,12 @@ use search::Search;
 /// One sigma of the logarithm of the stiffness of a tread that has shown before the first crossing
 /// that it is not as known.
 pub const SHOWN_DEVIATION: Ratio = q16(240_000);
-/// Stiffness scale up to which the tread is as known: three deviations.
-pub const KNOWN_SCALE: Ratio = q16(1_150_000);
+/// Stiffness scale up to which the tread is as known: two deviations. What is off by more is not,
+/// as of the load that the drive shows.
+pub const KNOWN_SCALE: Ratio = q16(1_100_000);
 /// Deviations of the stiffness by which the plan takes the tread for stiffer than it seems: five of
 /// six are not stiffer.
 const SIGMAS: Ratio = q16(1_000_000);
-
-/// Relative difference of an observed stiffness above which it is reported. Rubber that is off
-/// by three deviations makes 0.12 at the first crossing; the rest is the measurement, where a
-/// stiff guess costs most. One in a hundred random rigs exceeds it at one of its crossings.
-const STRANGE: Ratio = q16(270_000);
 
 /// Measured gap over the reference from which it is reported: twice the error of the measurement
 /// on coupled treads.

@@ -1,7 +1,6 @@
 //! Checks of the sensors against one another and against the bridges' commands. Each compares two
 //! quantities that no single fault changes alike. They run while the drive is on and start again
-//! when it has been off. Each threshold exceeds the worst of fault-free random rigs of both
-//! presets by the part given with its constant; a campaign of 10,000 rigs confirms it.
+//! when it has been off.
 
 #![deny(clippy::float_arithmetic)]
 
@@ -18,8 +17,8 @@ const SPAN: usize = 6;
 const KEPT: usize = 16;
 /// Distance by which reference and encoder may bend apart within two spans, counts. Three
 /// readings of a counter are off by less than 2 counts together; a third full count takes
-/// `1 / (6 ms)^2`, 530 mm/s^2 beyond the reference: twice the acceleration of the profile. The
-/// worst of the random rigs is 2.1. Of finer counts that acceleration itself is the bound.
+/// `1 / (6 ms)^2`, 530 mm/s^2 beyond the reference: twice the acceleration of the profile. Of
+/// finer counts that acceleration itself is the bound.
 const BENT_COUNTS: f64 = 2.5;
 const BENT_ACCELERATIONS: f64 = 2.0;
 /// Distance off the reference within two spans, mm: the dips behind a step make 0.11, and two

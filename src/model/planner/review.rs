@@ -4,9 +4,9 @@
 #![deny(clippy::float_arithmetic)]
 
 use super::course::STRIDES_AT_ONCE;
-use super::{Planner, STRANGE, WIDE};
+use super::{Planner, WIDE};
 use crate::model::history::{HistoryStride, STRIDES};
-use crate::model::plan::{Learned, Outcome, Review};
+use crate::model::plan::{KNOWN_DEVIATION, Learned, Outcome, Review};
 use crate::model::rollout::LiftOff;
 use crate::model::tread::{Axial, Drive, TreadState};
 use crate::numeric::{between, divide, sqrt};
@@ -171,6 +171,8 @@ impl Planner {
         let missed = divide(review.gap - rolled.gap, rolled.gap);
         let seen = between(divide(missed, sensitivity), -MOST_OFF, MOST_OFF);
         let error = divide(MEASURED_WITHIN, rolled.gap * sensitivity);
+        // Rubber and measurement, three deviations of each.
+        outcome.strange = seen.abs() > (KNOWN_DEVIATION + error) * q16(3_000_000);
         // The first crossing shows a tread no stiffer than the known one: it was softer, and is
         // as known otherwise.
         let first = known.grips == Q16::ZERO && review.direction == Direction::Deploy;
@@ -190,7 +192,6 @@ impl Planner {
         let half = off * gain.half();
         let wanted = known.scale * divide(Q16::ONE + half, Q16::ONE - half);
         learned.scale = between(wanted, self.scale_range.0, self.scale_range.1);
-        outcome.strange = seen.abs() > STRANGE;
         if seen > credible {
             learned.unknown = true;
             learned.deviation = learned.deviation.max(UNLIKE);

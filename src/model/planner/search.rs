@@ -28,16 +28,11 @@ const GOLDEN: Ratio = q16(618_034);
 const NEAR: Ratio = q16(5_000);
 /// Change of the slowest speed with the gap that is tried first, 1/s.
 const FIRST_SLOPE: Q16 = q16(30_000_000);
-/// What a course counts that opens too wide a gap at its slowest, s, and for each part of that.
+/// What a course counts that opens too wide a gap at its slowest, s, times that gap over the target:
+/// more than any that keeps it, and the narrowest least.
 const INFEASIBLE: Seconds = q16(1_000_000_000);
 /// Windows that are tried for a tread that no compared one suits.
 const SLOWER: u32 = 5;
-/// Time that a gap beyond its target counts as, s for each part of it: 6 s for a
-/// hundredth. Chosen on drawn rigs.
-const PENALTY: Seconds = q16(600_000_000);
-/// Slowest speeds that are tried where none keeps the gap, as parts of the range: at faster ones the
-/// gap of coupled rubber grows more than the rollout has it. Chosen on drawn rigs.
-const TOO_WIDE: [Ratio; 2] = [q16(25_000), q16(50_000)];
 
 /// A search for a course; it pauses every few strides.
 pub(super) struct Search<'a, P> {
@@ -172,7 +167,7 @@ impl<'a, P: AsyncFnMut()> Search<'a, P> {
             self.guess = slowest;
         }
         if gap > self.target + self.target * NEAR || slowest <= self.floor && gap > self.target {
-            return self.cost_too_wide(&course) + INFEASIBLE;
+            return divide(gap, self.target) * INFEASIBLE;
         }
         let apart = before.rolled.gap - gap;
         if before.rolled.gap > Q16::ZERO && apart.abs() > self.target * WITHIN {
@@ -235,8 +230,8 @@ impl<'a, P: AsyncFnMut()> Search<'a, P> {
         }
     }
 
-    /// The course, or a slower one if the margin that it saves is worth its time, or a faster one if
-    /// none keeps the gap and what it adds is worth it.
+    /// The course, or a slower one if the margin that it saves is worth its time. Where none keeps the
+    /// gap, a search is no slower than the safe speed, whose gap is the reference.
     async fn gripping(
         &mut self,
         window: MillimetresPerSecond,
@@ -245,13 +240,8 @@ impl<'a, P: AsyncFnMut()> Search<'a, P> {
     ) -> Course {
         let mut best = course;
         if !self.fits(&course.rolled) && self.searching {
-            for part in TOO_WIDE {
-                let speed = self.floor + (self.ceiling - self.floor) * part;
-                let faster = self.roll(window.max(speed), release, speed).await;
-                if self.cost_too_wide(&faster) < self.cost_too_wide(&best) {
-                    best = faster;
-                }
-            }
+            let safe = between(self.planner.safe_speed, self.floor, self.ceiling);
+            best = self.roll(window.max(safe), release, safe).await;
         } else if self.price(&course.rolled) > Q16::ZERO {
             let fastest = course.approach.slowest_speed;
             for part in [q16(750_000), q16(500_000), q16(250_000), Q16::ZERO] {
@@ -290,11 +280,6 @@ impl<'a, P: AsyncFnMut()> Search<'a, P> {
         let slowest = course.approach.slowest_speed;
         let speed = if self.searching { slowest } else { self.scene.cruise };
         divide(before, speed) + rolled.takes + rolled.regains + self.price(rolled)
-    }
-
-    /// The same with what the gap is beyond its target.
-    fn cost_too_wide(&self, course: &Course) -> Seconds {
-        self.cost(course) + divide(course.rolled.gap - self.target, self.target) * PENALTY
     }
 
     /// Time that the margin of friction is worth which this lacks, s.
