@@ -36,6 +36,11 @@ enum Limit {
 /// Name of what is told over nominal.
 const DRIVE: &str = "drive force over nominal";
 
+/// Start of the names of the steps' places.
+const PLACES: &str = "rig.step_positions_mm";
+/// How far from its end a run arrives at most, mm.
+const ARRIVES_MM: f64 = 0.5;
+
 /// By the start of the name. At its limit a tread's key changes the gap by 1 %, a height by 3 %, the
 /// load changes the friction needed by 3 % (`rig crossing` at 10 mm/s and 47.6 N). Friction: three
 /// sigma of what two logs show of it. Places: what the end of travel has. Dead time and lag: half a
@@ -48,7 +53,7 @@ const LIMITS: [(&str, Limit); 12] = [
     ("plant.mu", Limit::Part(0.12)),
     ("plant.top_load_n", Limit::Part(0.1)),
     (DRIVE, Limit::Part(0.04)),
-    ("rig.step_positions_mm", Limit::Of(0.5)),
+    (PLACES, Limit::Of(ARRIVES_MM)),
     ("rig.step_height_mm", Limit::Of(0.1)),
     ("preload.delay_s", Limit::Of(0.02)),
     ("preload.lag_s", Limit::Of(0.02)),
@@ -131,8 +136,9 @@ pub fn accept(
     }
     let same = contact::agree(&fit.runs, &fit.coordinates, &fit.contact);
     reasons.extend(same.err().map(|error| error.to_string()));
-    let residuals = residuals(&found, &fit)?;
-    let keys = keys(&found, &first.scenario);
+    let off = fit.starts_off(&first.scenario);
+    let residuals = residuals(&found, &fit, off)?;
+    let keys = keys(&found, &first.scenario, off);
     let gap = gaps(records, runs, &fit, readings);
     let off = residuals
         .iter()
@@ -154,14 +160,17 @@ pub fn brief(value: f64) -> String {
     if value.abs() >= 1e4 { format!("{value:.3e}") } else { number(value, 3) }
 }
 
-/// What the virtual rig with the stated parameters leaves; sensors and wheel within their
+/// What the virtual rig with the stated parameters leaves, all its steps this far off, mm; sensors and wheel within their
 /// tolerances, as found. The preload is the pre-tightener's as found: its keys are judged.
-fn residuals(found: &Identification, fit: &Fit) -> Result<Vec<Residual>, IdentifyError> {
+fn residuals(found: &Identification, fit: &Fit, off: f64) -> Result<Vec<Residual>, IdentifyError> {
     let mut x = fit.contact.x.clone();
     let stated =
         [STIFFNESS, STIFFENING, TAU, FRICTION, LOAD].into_iter().chain(fit.coordinates.of_steps());
     for index in stated {
         x[index] = fit.coordinates.priors()[index].mean;
+    }
+    for step in 0..fit.coordinates.steps() {
+        x[fit.coordinates.position(step)] += off;
     }
     let mut left: [Vec<f64>; 3] = Default::default();
     for run in &fit.runs {
@@ -183,7 +192,7 @@ fn residuals(found: &Identification, fit: &Fit) -> Result<Vec<Residual>, Identif
     Ok(rows.map(row).collect())
 }
 
-fn keys(found: &Identification, scenario: &Scenario) -> Vec<Key> {
+fn keys(found: &Identification, scenario: &Scenario, off: f64) -> Vec<Key> {
     let mut table = Table::try_from(scenario).expect("a scenario is always TOML");
     let mut key = |of: &Parameter| {
         let (_, limit) = LIMITS.iter().find(|(name, _)| of.name.starts_with(name))?;
@@ -195,10 +204,26 @@ fn keys(found: &Identification, scenario: &Scenario) -> Vec<Key> {
         // The drive's force is known by its tolerance, another key by an interval within its limit.
         let within = of.high.zip(of.low).is_some_and(|(high, low)| high - low <= 2.0 * limit);
         let is_known = of.identified || within || of.name == DRIVE;
-        let ok = is_known && (of.value - stated).abs() <= limit;
+        let off = if of.name.starts_with(PLACES) { off } else { 0.0 };
+        let ok = is_known && (of.value - off - stated).abs() <= limit;
         Some(Key { found: of.clone(), stated, limit, ok })
     };
     found.parameters.iter().filter_map(&mut key).collect()
+}
+
+impl Fit {
+    /// How far all steps are off that logs show which begin where an earlier run arrived, mm: their
+    /// starts are. Of a log that begins stowed it is none.
+    fn starts_off(&self, scenario: &Scenario) -> f64 {
+        let stated = &scenario.rig.rig.step_positions_mm;
+        let (of, x) = (&self.coordinates, &self.contact.x);
+        if stated.is_empty() || self.runs.iter().any(|run| !run.traces.is_loaded()) {
+            return 0.0;
+        }
+        let steps = stated.iter().enumerate();
+        let off: f64 = steps.map(|(step, at)| of.scale(x) * x[of.position(step)] - at).sum();
+        (off / stated.len() as f64).clamp(-ARRIVES_MM, ARRIVES_MM)
+    }
 }
 
 /// Every crossing's gap by a second way: a reading if there is one, else the ring that followed the
