@@ -195,6 +195,7 @@ fn commission(seed: u64) -> (Vec<String>, Vec<String>) {
         ("tread.tau_s", plant.ring.tau_s),
         ("plant.mu", plant.mu),
         ("plant.top_load_n", plant.load_n / mine.rig.plant.top_load_share),
+        ("drive.no_load_speed_mm_s", plant.drive.no_load_mm_s),
         ("preload.slew_n_per_s", plant.slew_n_per_s),
         ("preload.spring_n_per_mm", plant.spring_n_per_mm),
     ] {

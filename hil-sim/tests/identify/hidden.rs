@@ -86,6 +86,7 @@ fn hidden(p: &PlantParameters, known: &Scenario, zeros: (f64, f64)) -> Vec<(Stri
         ("tread.tau_s", p.ring.tau_s),
         ("plant.mu", p.mu),
         ("plant.top_load_n", p.load_n / known.rig.plant.top_load_share),
+        ("drive.no_load_speed_mm_s", p.drive.no_load_mm_s),
         ("sense.angle_zero_code", zero_code),
         ("preload.delay_s", p.delay_s),
         ("preload.lag_s", p.lag_s),
