@@ -204,7 +204,7 @@ fn a_report_names_what_is_known() {
     let again = Restart { reset: Reset::Pin, snapshot: Some(away), crash: None };
     assert_eq!(
         again.to_string(),
-        "started: by the reset pin; before: Run(Deploy, Approach) at tick 9, 0.00 mm, level 1, \
+        "started: by the reset pin; before: deploying: approach at 0.009 s, 0.00 mm, level 1, \
          its place unsure"
     );
     let snapshot = DriveSnapshot {
@@ -221,7 +221,7 @@ fn a_report_names_what_is_known() {
     assert_eq!(
         text,
         "started: by the watchdog; the control tick, kept from the processor did not come, \
-         at 0x10 from 0x20; before: Run(Deploy, Approach) at tick 9, 0.00 mm, level 1, \
+         at 0x10 from 0x20; before: deploying: approach at 0.009 s, 0.00 mm, level 1, \
          last fault 122, the control tick was late"
     );
 }
