@@ -25,7 +25,7 @@ use crate::scenario::Scenario;
 pub use figures::stowed;
 pub use line::Line;
 pub use operate::{FARTHEST_MM, Operated, Operation, operate};
-pub use operator::{Action, FREE, ON_WALL, Operator, Question, Seen, Sensor, Stdin};
+pub use operator::{Action, Operator, Question, Seen, Sensor, Stdin};
 pub use page::html;
 pub use state::Progress;
 

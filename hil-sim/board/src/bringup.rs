@@ -4,8 +4,7 @@ use std::cell::RefCell;
 use std::rc::Rc;
 use std::time::Duration;
 
-use hil_sim::bringup::{Action, BringupError, FREE, ON_WALL, Operator, Question, Seen};
-use hil_sim::plant::rig::VirtualRig;
+use hil_sim::bringup::{Action, BringupError, Operator, Question, Seen};
 use hil_sim::probe::{Port, PortError};
 
 use super::bench::Bench;
@@ -50,13 +49,13 @@ impl<'a> Attended<'a> {
 
     /// The person, whose motions `asked` allows.
     pub fn person<O: Operator>(&self, asked: O) -> Person<'a, O> {
-        let bench = self.bench.borrow();
-        let (tread_mm, load_n) = (tread_mm(&bench.plant), bench.plant.parameters().load_n);
-        Person { bench: Rc::clone(&self.bench), asked, tread_mm, load_n }
+        let tread_mm = tread_mm(&self.bench.borrow());
+        Person { bench: Rc::clone(&self.bench), asked, tread_mm }
     }
 }
 
-fn tread_mm(plant: &VirtualRig) -> f64 {
+fn tread_mm(bench: &Bench<'_>) -> f64 {
+    let plant = &bench.plant;
     plant.truth().rotation_rad * plant.parameters().ring.radius_mm
 }
 
@@ -95,27 +94,18 @@ pub struct Person<'a, O> {
     asked: O,
     /// Where the tread was when it was last looked at.
     tread_mm: f64,
-    /// Load on the wheel while no hand carries it, N.
-    load_n: f64,
 }
 
 impl<O: Operator> Operator for Person<'_, O> {
     fn confirm(&mut self, motion: &str) -> Result<(), BringupError> {
         self.asked.confirm(motion)?;
-        let plant = &mut self.bench.borrow_mut().plant;
-        // What is carried does not press the wheel on through the arm.
-        if motion.starts_with(FREE) {
-            plant.set_load(0.0);
-        } else if motion.starts_with(ON_WALL) {
-            plant.set_load(self.load_n);
-        }
-        self.tread_mm = tread_mm(plant);
+        self.tread_mm = tread_mm(&self.bench.borrow());
         Ok(())
     }
 
     fn act(&mut self, action: Action) -> Result<(), BringupError> {
         let mut bench = self.bench.borrow_mut();
-        self.tread_mm = tread_mm(&bench.plant);
+        self.tread_mm = tread_mm(&bench);
         let wiring = &mut bench.wiring;
         match action {
             Action::SwitchOn => wiring.switched_off = false,
@@ -131,7 +121,7 @@ impl<O: Operator> Operator for Person<'_, O> {
 
     fn look(&mut self, question: Question) -> Result<Seen, BringupError> {
         let bench = self.bench.borrow();
-        let turned = tread_mm(&bench.plant) - self.tread_mm;
+        let turned = tread_mm(&bench) - self.tread_mm;
         let moved = if turned > SEEN_MM {
             Seen::Outwards
         } else if turned < -SEEN_MM {

@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use super::figures::{Counted, Scale, counted, mean};
 use super::line::{Motion, drive as drive_by, press};
 use super::motion::{CHANGED, bridge, driven, fault};
-use super::{BringupError, Check, FREE, Question, Seen, Session, check};
+use super::{BringupError, Check, Question, Seen, Session, check};
 use crate::table;
 
 /// Input data of port A, with the wheel encoder's lines.
@@ -19,9 +19,9 @@ const UNSURE: f64 = 0.05;
 
 /// The drive, wheel free.
 pub(super) fn drive(session: &mut Session<'_, '_>) -> Result<Vec<Check>, BringupError> {
-    session.operator.confirm(&format!(
-        "{FREE}, current limit low: the DRIVE turns outwards, 15 % for 0.6 s.",
-    ))?;
+    session.operator.confirm(
+        "Wheel free of the wall, current limit low: the DRIVE turns outwards, 15 % for 0.6 s.",
+    )?;
     // Levels that each line of the encoder has had: low, high.
     let mut lines = [[false; 2]; 2];
     let slow = session.line.move_and(drive_by(SLOW), 600, 300, |line| {

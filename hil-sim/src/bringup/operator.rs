@@ -5,10 +5,6 @@ use std::io::{BufRead, Write};
 
 use super::BringupError;
 
-/// How a motion begins for which a hand holds the wheel off the wall, or has put it there again.
-pub const FREE: &str = "Wheel free of the wall";
-pub const ON_WALL: &str = "Wheel on the wall";
-
 /// A sensor with a plug.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sensor {
