@@ -149,7 +149,7 @@ fn moved(wall: &Wall, by_mm: [f64; 3]) -> Wall {
     Wall::new(steps.map(|(s, by)| Step { position_mm: s.position_mm + by, ..*s }).collect())
 }
 
-/// First of the seeds, which tuned nothing.
+/// First of the seeds; of these 9, 13 and 16 have tuned the fit since.
 const FIRST: u64 = 2_100_001;
 
 /// Commissions the rig of a seed: keys outside their interval, and why it fails, if it does.
