@@ -248,7 +248,7 @@ fn a_jump_is_tolerated_and_repeated_jumps_are_not() {
 }
 
 proptest! {
-    /// A wheel that follows a smooth reference as well as the random rigs do.
+    /// A wheel that follows a smooth reference within what the checks allow.
     #[test]
     fn no_alarm_within_the_tolerances(
         speed in -30.0..30.0f64,

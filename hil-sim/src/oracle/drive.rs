@@ -46,7 +46,7 @@ impl Driven {
         let p = plant.parameters();
         let rise = plant.truth().height_mm - p.ring.radius_mm;
         let seat = plant.truth().preload_n - p.spring_n_per_mm * rise;
-        let screw = Pretightener::of(p, 0.0, TICK_S, seat, limits.screw_n);
+        let screw = p.pretightener(0.0, TICK_S, seat, limits.screw_n);
         Self {
             limits,
             screw,

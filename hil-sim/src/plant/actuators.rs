@@ -3,8 +3,6 @@
 
 use std::collections::VecDeque;
 
-use super::draw::PlantParameters;
-
 /// Time constant with which a wheel stops whose bridge is switched off, s.
 pub(super) const STOPS_IN_S: f64 = 0.003;
 
@@ -173,21 +171,6 @@ impl Pretightener {
             droop_per_n: 0.0,
             friction: 0.0,
         }
-    }
-
-    /// That of a plant with this dead time, s.
-    pub fn of(
-        p: &PlantParameters,
-        delay_s: f64,
-        dt_s: f64,
-        seat_n: f64,
-        range: (f64, f64),
-    ) -> Self {
-        Self::new(p.slew_n_per_s, p.lag_s, delay_s, dt_s, seat_n, range).with_losses(
-            p.screw_droop,
-            p.screw_friction,
-            p.preload_limit_n,
-        )
     }
 
     /// The same with a motor whose speed falls by the part `droop` as it raises `limit_n`, and

@@ -5,7 +5,7 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use super::actuators::DriveMotor;
+use super::actuators::{DriveMotor, Pretightener};
 use super::arm::{Arm, ModeParameters};
 use super::ring::RingParameters;
 use super::spread::{Noise, Spread};
@@ -145,6 +145,21 @@ impl PlantParameters {
     /// The tread displaced along the wall.
     pub fn shear(&self) -> Shear {
         Shear::of(&self.ring, self.wind_up.0 * self.wind_up.1)
+    }
+
+    /// The pre-tightener with this dead time, s.
+    pub fn pretightener(
+        &self,
+        delay_s: f64,
+        dt_s: f64,
+        seat_n: f64,
+        range: (f64, f64),
+    ) -> Pretightener {
+        Pretightener::new(self.slew_n_per_s, self.lag_s, delay_s, dt_s, seat_n, range).with_losses(
+            self.screw_droop,
+            self.screw_friction,
+            self.preload_limit_n,
+        )
     }
 
     /// The plant of a seed: `rig` with this spread, and with these steps, each its position

@@ -155,7 +155,7 @@ impl VirtualRig {
         let steps = parameters.wall.steps().iter();
         let highest_mm: f64 = steps.map(|step| step.height_mm.max(0.0) + STEP_ROOM_MM).sum();
         let range = (-parameters.spring_n_per_mm * highest_mm, parameters.seat_max_n);
-        let preload = Pretightener::of(&parameters, parameters.delay_s, dt_s, seat, range);
+        let preload = parameters.pretightener(parameters.delay_s, dt_s, seat, range);
         let modes = parameters.modes.iter().map(|&mode| Mode::new(mode)).collect();
         let mut rig = Self {
             resolution: Resolution::default(),

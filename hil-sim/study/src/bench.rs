@@ -75,7 +75,7 @@ pub fn measure(options: Options, say: &dyn Fn(&str)) -> Result<Report> {
     let mut variants = rollout::measure()?;
     let (tick, cycles_left_out) = if options.cycles {
         say("cycles");
-        match cycles::run() {
+        match cycles::run(&rollout::inputs()?) {
             Ok((calls, tick)) => {
                 rollout::fill(&calls, &mut variants)?;
                 (Some(tick), None)

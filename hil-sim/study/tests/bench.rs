@@ -45,7 +45,7 @@ fn a_rollout_answers_on_the_core_as_on_the_host() {
     if !super::long() {
         return;
     }
-    let (calls, _) = cycles::run().unwrap();
+    let (calls, _) = cycles::run(&rollout::inputs().unwrap()).unwrap();
     let mut variants = rollout::measure().unwrap();
     rollout::fill(&calls, &mut variants).unwrap();
     assert!(variants[0].cycles.unwrap() > 10_000, "{variants:?}");

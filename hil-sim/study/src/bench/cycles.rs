@@ -12,8 +12,6 @@ use serde_json::json;
 
 use hil_sim::provision::{Extra, featured};
 
-use super::rollout::inputs;
-
 /// Calls of one function.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 pub struct Calls {
@@ -61,8 +59,9 @@ pub struct WithWaits {
     pub worst: u64,
 }
 
-/// Rollouts and the control tick on the emulated core, which is built first if need be.
-pub fn run() -> Result<(Calls, Tick)> {
+/// Rollouts of these crossings and the control tick on the emulated core, which is built first if
+/// need be.
+pub fn run(inputs: &[Given]) -> Result<(Calls, Tick)> {
     #[derive(Deserialize)]
     struct TickCost {
         tick: Cost,
@@ -71,7 +70,7 @@ pub fn run() -> Result<(Calls, Tick)> {
     let binary = featured(Extra::Board)?;
     let name = format!("rig-study-{}.json", std::process::id());
     let script = std::env::temp_dir().join(name);
-    std::fs::write(&script, serde_json::to_vec(&steps()?)?)?;
+    std::fs::write(&script, serde_json::to_vec(&steps(inputs))?)?;
     let done = start(&binary, &["--script".as_ref(), script.as_os_str()]);
     std::fs::remove_file(&script)?;
     let calls: [Calls; 2] = done?;
@@ -95,10 +94,10 @@ fn start<T: DeserializeOwned>(binary: &Path, arguments: &[&std::ffi::OsStr]) -> 
 }
 
 /// The script: build the tread, then roll it out over every crossing.
-fn steps() -> Result<[serde_json::Value; 2]> {
-    let inputs: Vec<[u32; 7]> = inputs()?.iter().map(Given::words).collect();
-    Ok([
+fn steps(inputs: &[Given]) -> [serde_json::Value; 2] {
+    let inputs: Vec<[u32; 7]> = inputs.iter().map(Given::words).collect();
+    [
         json!({ "call": { "function": "model_build", "arguments": [PRESET as u32] } }),
         json!({ "measure": { "function": "rollout", "inputs": inputs } }),
-    ])
+    ]
 }
