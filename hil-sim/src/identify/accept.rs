@@ -221,9 +221,14 @@ impl Fit {
             return 0.0;
         }
         let steps = stated.iter().enumerate();
-        let off: f64 = steps.map(|(step, at)| of.scale(x) * x[of.position(step)] - at).sum();
-        (off / stated.len() as f64).clamp(-ARRIVES_MM, ARRIVES_MM)
+        together(steps.map(|(step, at)| of.scale(x) * x[of.position(step)] - at).collect())
     }
+}
+
+/// Part of these distances, mm, that one start explains.
+fn together(off_mm: Vec<f64>) -> f64 {
+    let mean = off_mm.iter().sum::<f64>() / off_mm.len() as f64;
+    mean.clamp(-ARRIVES_MM, ARRIVES_MM)
 }
 
 /// Every crossing's gap by a second way: a reading if there is one, else the ring that followed the
@@ -248,4 +253,27 @@ fn gaps(records: &[Record], runs: &[Summary], fit: &Fit, readings: &[(usize, f64
         }
     }
     all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_start_explains_what_all_steps_are_off_and_no_more_than_a_run_arrives_off() {
+        let left = |off: [f64; 3]| {
+            let start = together(off.to_vec());
+            off.map(|off| (off - start).abs()).into_iter().fold(0.0, f64::max)
+        };
+        for (off, ok) in [
+            ([-0.7, -0.65, -0.6], true),
+            ([0.9; 3], true),
+            ([2.0; 3], false),
+            ([-2.0; 3], false),
+            ([0.0, 1.0, 0.0], false),
+            ([0.0, -1.0, 0.0], false),
+        ] {
+            assert_eq!(left(off) <= ARRIVES_MM, ok, "{off:?}");
+        }
+    }
 }
