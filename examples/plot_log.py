@@ -114,8 +114,8 @@ def main():
     svg += [label(20, 1102, "dashed: reference, face (grey), lift-off (red); distance before the face "
                             "from -20 to 8 mm", size=18), "</svg>", ""]
     pathlib.Path(out).write_text("\n".join(svg), encoding="utf-8")
-    print(f"{out}: measured gap {gap:.3f} mm at {log['wheel_speed_mm_s'][lift]:.2f} mm/s "
-          f"and {log['preload_n'][lift]:.1f} N")
+    print(f"{out}: measured gap {gap:.3f} mm; at that instant "
+          f"{log['wheel_speed_mm_s'][lift]:.2f} mm/s and {log['preload_n'][lift]:.1f} N")
 
 
 if __name__ == "__main__":

@@ -8,8 +8,17 @@ use rayon::prelude::*;
 pub use frame::{Column, Frame, column};
 pub use shard::{Shard, ShardError};
 
-/// Computes a case; calls its second argument after each of its steps.
-type Run<'a, C, L, E> = dyn Fn(&C, &(dyn Fn() + Sync)) -> Result<L, E> + Sync + 'a;
+/// What watches a campaign.
+#[derive(Clone, Copy)]
+pub struct Watch<'a> {
+    /// Called after each step of a case.
+    pub done: &'a (dyn Fn() + Sync),
+    /// Whether an end is wanted.
+    pub stop: &'a (dyn Fn() -> bool + Sync),
+}
+
+/// Computes a case; none if it was given up, as an end was wanted.
+type Run<'a, C, L, E> = dyn Fn(&C, Watch) -> Result<Option<L>, E> + Sync + 'a;
 /// Makes an outcome of cases and their lines, in the order of the cases.
 type Fold<'a, C, L, O> = dyn FnOnce(Vec<(C, L)>) -> O + 'a;
 
@@ -27,20 +36,18 @@ pub struct Campaign<'a, C, L, O, E> {
 
 impl<C: Sync, L: Send, O, E: Send> Campaign<'_, C, L, O, E> {
     /// The lines of the cases at these places, on all processors, without those that had not
-    /// begun when `stop` was wanted; `done` is called after each step. The lines do not depend
-    /// on the number of processors.
+    /// begun or were given up when an end was wanted. The lines do not depend on the number of
+    /// processors.
     ///
     /// # Errors
     /// The first one of a case.
-    pub fn lines(
-        &self,
-        places: &[usize],
-        stop: &(dyn Fn() -> bool + Sync),
-        done: &(dyn Fn() + Sync),
-    ) -> Result<Vec<(usize, L)>, E> {
+    pub fn lines(&self, places: &[usize], watch: Watch) -> Result<Vec<(usize, L)>, E> {
         let Self { cases, run, .. } = self;
-        let line = |place: &usize| Ok((*place, run(&cases[*place], done)?));
-        places.par_iter().filter(|_| !stop()).map(line).collect()
+        let line = |place: &usize| {
+            let line = run(&cases[*place], watch).transpose()?;
+            Some(line.map(|line| (*place, line)))
+        };
+        places.par_iter().filter(|_| !(watch.stop)()).filter_map(line).collect()
     }
 
     /// The outcome of these lines, each with the place of its case.
@@ -56,7 +63,7 @@ impl<C: Sync, L: Send, O, E: Send> Campaign<'_, C, L, O, E> {
     /// The first one of a case.
     pub fn complete(self, done: &(dyn Fn() + Sync)) -> Result<O, E> {
         let places: Vec<usize> = (0..self.cases.len()).collect();
-        let lines = self.lines(&places, &|| false, done)?;
+        let lines = self.lines(&places, Watch { done, stop: &|| false })?;
         Ok(self.outcome(lines))
     }
 }
@@ -71,9 +78,9 @@ mod tests {
         let squares = || Campaign {
             steps: ("squares", 1),
             cases: vec![3, 1, 2],
-            run: Box::new(|case: &i32, step| {
-                step();
-                Ok::<_, ()>(case * case)
+            run: Box::new(|case: &i32, watch| {
+                (watch.done)();
+                Ok::<_, ()>((!(watch.stop)()).then_some(case * case))
             }),
             fold: Box::new(|lines: Vec<(i32, i32)>| lines),
         };
@@ -82,7 +89,13 @@ mod tests {
         };
         assert_eq!(squares().complete(&count), Ok(vec![(3, 9), (1, 1), (2, 4)]));
         assert_eq!(done.into_inner(), 3);
-        assert_eq!(squares().lines(&[0, 1, 2], &|| true, &|| {}), Ok(Vec::new()));
+        // An end that is wanted from the third question on: the second case is given up.
+        let asked = std::sync::atomic::AtomicUsize::new(0);
+        let stop = || asked.fetch_add(1, std::sync::atomic::Ordering::Relaxed) > 2;
+        let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
+        let lines =
+            one.install(|| squares().lines(&[0, 1, 2], Watch { done: &|| {}, stop: &stop }));
+        assert_eq!(lines, Ok(vec![(0, 9)]));
         assert_eq!(squares().outcome(vec![(2, 4), (0, 9)]), [(3, 9), (2, 4)]);
     }
 }

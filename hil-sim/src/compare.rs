@@ -9,7 +9,7 @@ use interstage::units::Direction;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::campaign::Campaign;
+use crate::campaign::{Campaign, Watch};
 use crate::montecarlo::{self, RunLine};
 use crate::oracle::{self, Bounds};
 use crate::scenario::{ControllerKind, Scenario};
@@ -123,30 +123,39 @@ pub fn campaign(
     let direction: Direction = scenario.run.direction.into();
     let reference = Planner::try_build(&scenario.rig)?.gap_ref(direction).to_num::<f64>();
     let runs = seeds.len();
-    let run = move |kind: &ControllerKind, done: &(dyn Fn() + Sync)| {
-        let (entry, lines) = tuning::tune(reference, |reserve| {
+    let run = move |kind: &ControllerKind, watch: Watch| {
+        let tuned = tuning::tune(reference, |reserve| {
             let mut scenario = scenario.clone();
             scenario.run.controller = *kind;
             // Not the rig's own reserve: the crossings earn that back.
             scenario.rig.control.gap_ref_mm = reference * (1.0 - reserve);
-            let lines = montecarlo::campaign(&scenario, seeds.clone()).complete(done)?;
-            Ok((Entry::of(kind.name(), Some(reserve), &lines), lines))
+            let rigs = montecarlo::campaign(&scenario, seeds.clone());
+            let lines = rigs.lines(&(0..runs).collect::<Vec<_>>(), watch)?;
+            let lines: Vec<RunLine> = lines.into_iter().map(|(_, line)| line).collect();
+            let entry = Entry::of(kind.name(), Some(reserve), &lines);
+            Ok((lines.len() == runs).then_some((entry, lines)))
         })?;
+        let Some((entry, lines)) = tuned else { return Ok(None) };
         let mut compared = Compared { entry, oracle: None, oracle_fails: Vec::new() };
         if let Some(effort) = effort.filter(|_| *kind == ControllerKind::Scheduled) {
             let best = |line: &RunLine| {
+                if (watch.stop)() {
+                    return Ok(None);
+                }
                 let mut scenario = scenario.clone();
                 scenario.run.seed = line.seed;
                 let found = oracle::search(&scenario, &Bounds::of(line, reference), effort);
-                done();
-                found.map(|run| run.line)
+                (watch.done)();
+                found.map(|run| Some(run.line))
             };
-            let lines = lines.par_iter().map(best).collect::<Result<Vec<_>, _>>()?;
+            let lines: Option<Vec<_>> =
+                lines.par_iter().map(best).collect::<Result<_, RunError>>()?;
+            let Some(lines) = lines else { return Ok(Some(compared)) };
             let fails = |line: &RunLine| Some((line.seed, line.error.clone()?));
             compared.oracle_fails = lines.iter().filter_map(fails).collect();
             compared.oracle = Some(Entry { tuned: true, ..Entry::of(ORACLE, None, &lines) });
         }
-        Ok(compared)
+        Ok(Some(compared))
     };
     let fold = move |lines: Vec<(ControllerKind, Compared)>| {
         let oracle = lines.iter().find_map(|(_, line)| line.oracle.clone());

@@ -8,7 +8,7 @@ mod picture;
 use interstage::model::Planner;
 use serde::{Deserialize, Serialize};
 
-use crate::campaign::Campaign;
+use crate::campaign::{Campaign, Watch};
 use crate::compare::STRATEGIES;
 use crate::report::verdict::SLIP_SEEN_MM;
 use crate::scenario::{ControllerKind, Scenario};
@@ -128,10 +128,10 @@ pub fn campaign(
             }
         }
     }
-    let run = |&(known, friction, load_n, kind): &Place, done: &(dyn Fn() + Sync)| {
+    let run = |&(known, friction, load_n, kind): &Place, watch: Watch| {
         let cell = cell(scenario, known, friction, load_n, kind);
-        done();
-        Ok(cell)
+        (watch.done)();
+        Ok(Some(cell))
     };
     let loads = &scenario.rig.plant;
     let nominal = (loads.mu, loads.top_load_n * loads.top_load_share);

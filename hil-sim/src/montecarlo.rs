@@ -155,10 +155,10 @@ pub fn campaign(
     Campaign {
         steps: ("runs", 1),
         cases: seeds,
-        run: Box::new(|seed, done| {
+        run: Box::new(|seed, watch| {
             let line = one(scenario, *seed);
-            done();
-            line
+            (watch.done)();
+            line.map(Some)
         }),
         fold: Box::new(|lines| lines.into_iter().map(|(_, line)| line).collect()),
     }

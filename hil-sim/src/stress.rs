@@ -9,7 +9,7 @@ use std::convert::Infallible;
 
 use serde::Serialize;
 
-use crate::campaign::Campaign;
+use crate::campaign::{Campaign, Watch};
 
 pub use cases::StressCase;
 use cases::{RADIUS_MM, beyond, draw};
@@ -97,10 +97,11 @@ pub fn campaign(
     count: usize,
     seed: u64,
 ) -> Campaign<'static, StressCase, Ran, StressReport, Infallible> {
-    let run = |case: &StressCase, done: &(dyn Fn() + Sync)| {
+    let run = |case: &StressCase, watch: Watch| {
         let figures = one(case);
-        done();
-        Ok(figures.map(|all| all.map(|value| Some(value).filter(|v| v.is_finite())).to_vec()))
+        (watch.done)();
+        let finite = |value| Some(value).filter(|v: &f64| v.is_finite());
+        Ok(Some(figures.map(|all| all.map(finite).to_vec())))
     };
     let fold = move |lines| {
         let mut report = gather(lines);

@@ -6,7 +6,7 @@ use comfy_table::{Cell, CellAlignment, ContentArrangement, Table, TableComponent
 /// Most columns that the output takes.
 const WIDTH: u16 = 100;
 /// Columns that every output may take.
-const NARROW: u16 = 80;
+pub const NARROW: u16 = 80;
 
 /// Columns that the output takes: those of the terminal within 80 to 100, elsewhere 100.
 pub fn width() -> u16 {

@@ -271,15 +271,13 @@ impl Planner {
         let slowest = approach.slowest_speed;
         plan.approach = Approach { release_time: rolled.released, lift: rolled.lift, ..approach };
         plan.cross_speed = self.prescribed_speed.unwrap_or(rolled.speed.max(slowest));
-        plan.cross_preload = match self.strategy {
-            Strategy::Limit => self.most_preload,
-            _ => rolled.preload,
+        plan.cross_preload = rolled.preload;
+        let raises = match self.strategy {
+            Strategy::Constant => false,
+            Strategy::Scheduled => rolled.rising || rises_further,
+            Strategy::Reactive | Strategy::Limit => true,
         };
-        plan.ramp_preload = plan.cross_preload;
-        let raises = self.strategy == Strategy::Scheduled && (rolled.rising || rises_further);
-        if raises || scene.reacts {
-            plan.ramp_preload = self.most_preload;
-        }
+        plan.ramp_preload = if raises { self.most_preload } else { plan.cross_preload };
         plan.gap = rolled.gap;
         let (friction, _) = self.friction_of(learned);
         plan.slip_margin = friction - rolled.utilisation;

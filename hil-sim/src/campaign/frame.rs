@@ -79,13 +79,16 @@ impl Frame {
         String::from_utf8(table.into_inner().unwrap_or_default()).unwrap_or_default()
     }
 
-    /// As a page with this headline.
-    pub fn html(&self, headline: &str, good: bool) -> String {
+    /// As a page with this headline, and what was printed.
+    pub fn html(&self, headline: &str, text: &str, good: bool) -> String {
         let heads: Vec<String> = self.heads(", ").map(|head| escape(&head)).collect();
         let rows = self.shown().map(|row| row.iter().map(|cell| escape(cell)).collect());
         let rows = table("ledger pairs rows", &heads, rows.collect());
         let grade = if good { "good" } else { "bad" };
-        page_of("a campaign", grade, headline, &format!("<section>\n{rows}</section>\n"))
+        let printed = escape(text);
+        let body =
+            format!("<section>\n{rows}</section>\n<section>\n<pre>{printed}</pre>\n</section>\n");
+        page_of("a campaign", grade, headline, &body)
     }
 
     fn heads(&self, between: &'static str) -> impl Iterator<Item = String> {
@@ -132,8 +135,10 @@ mod tests {
             text.contains("a, <b>") && text.contains("1.23 ") && text.contains("yes"),
             "{text}"
         );
-        let page = frame.html("5 runs", true);
-        for part in ["<th>gap, mm</th>", "<td>a, &lt;b&gt;</td>", "<td>1.23</td>", "<td>-</td>"] {
+        let page = frame.html("5 runs", "a > b", true);
+        for part in
+            ["<th>gap, mm</th>", "<td>a, &lt;b&gt;</td>", "<td>1.23</td>", "<td>-</td>", "a &gt; b"]
+        {
             assert!(page.contains(part), "{part}: {page}");
         }
     }

@@ -10,7 +10,7 @@ use serde_json::Value;
 use super::failure::{Failure, Outcome};
 use super::log_files::Stop;
 use super::output;
-use crate::campaign::{Campaign, Frame, Shard};
+use crate::campaign::{Campaign, Frame, Shard, Watch};
 use crate::files::write_text;
 use crate::progress;
 use crate::table::counted;
@@ -118,7 +118,6 @@ pub(super) struct Found<O> {
     /// Its lines, unless they are all of the campaign.
     part: Option<Part>,
     partial: Option<Partial>,
-    what: &'static str,
 }
 
 /// How much is done of what was asked for.
@@ -171,8 +170,8 @@ impl CampaignArgs {
             None => {
                 let stop = Stop::by_ctrl_c();
                 let bar = progress::bar(what, (places.len() * steps) as u64);
-                let lines =
-                    campaign.lines(&places, &|| stop.is_wanted(), &|| bar.advance(1))?.into_iter();
+                let watch = Watch { done: &|| bar.advance(1), stop: &|| stop.is_wanted() };
+                let lines = campaign.lines(&places, watch)?.into_iter();
                 let line = |(at, line)| serde_json::to_value(line).map(|line| (at, line));
                 (lines.map(line).collect::<Result<_, _>>().map_err(Failure::run)?, command())
             }
@@ -190,7 +189,7 @@ impl CampaignArgs {
         let outcome = campaign.outcome(read.map_err(Failure::input)?);
         let version = env!("CARGO_PKG_VERSION").to_owned();
         let part = (done < cases).then_some(Part { version, command, parameters, cases, lines });
-        Ok(Found { outcome, part, partial: (done < of).then_some(Partial { done, of }), what })
+        Ok(Found { outcome, part, partial: (done < of).then_some(Partial { done, of }) })
     }
 }
 
@@ -216,14 +215,17 @@ impl<O> Found<O> {
         }
         let (text, good) = (text(), good && self.partial.is_none());
         let partial = self.partial.as_ref().map_or_else(String::new, |Partial { done, of }| {
-            format!("Partial: {done} of {of} cases ({}) are done\n", self.what)
+            format!("Partial: {done} of {of} cases are done\n")
         });
         for file in &args.show.table {
             let is_page = file.extension().is_some_and(|ending| ending == "html");
             // A text that begins with a table has no headline.
             let said = text.lines().next().filter(|line| !line.starts_with('\u{2500}'));
             let headline = partial.clone() + said.unwrap_or("Rows of a campaign");
-            write_text(file, &if is_page { rows.html(&headline, good) } else { rows.csv() })?;
+            write_text(
+                file,
+                &if is_page { rows.html(&headline, &text, good) } else { rows.csv() },
+            )?;
         }
         let printed = Printed { outcome: printed, partial: self.partial, campaign: &self.part };
         output::result(args.show.json, &printed, || {

@@ -38,7 +38,7 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
-    args.run.no_controller("every strategy is compared")?;
+    args.run.without("controller", "every strategy is compared")?;
     let scenario = args.run.resolve()?;
     let effort = (!args.no_oracle).then_some(Effort::Full);
     let campaign = compare::campaign(&scenario, scenario.seeds(args.count)?, effort)?;

@@ -55,7 +55,7 @@ struct Printed<'a> {
 }
 
 pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
-    args.run.no_controller("every strategy has its map")?;
+    args.run.without("controller", "every strategy has its map")?;
     let scenario = args.run.resolve()?;
     if args.out.exists() && !args.out.is_dir() {
         let path = args.out.display();

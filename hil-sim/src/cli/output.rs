@@ -7,6 +7,7 @@ use serde::Serialize;
 
 use super::failure::Failure;
 use crate::files::is_one_file;
+use crate::table::{NARROW, wrapped};
 
 /// A result with the files that were written, as `--json` prints both.
 #[derive(Serialize)]
@@ -30,7 +31,7 @@ pub fn result(
     }
 }
 
-/// The files that were written: a line a file, or one for a folder. Paths are not wrapped, so that
+/// The files that were written: a line a file, or a folder and their names. Paths are not wrapped, so that
 /// they can be copied.
 pub fn wrote(files: &[PathBuf]) -> String {
     let folder = files.first().and_then(|file| file.parent());
@@ -39,7 +40,10 @@ pub fn wrote(files: &[PathBuf]) -> String {
     {
         let names = files.iter().filter_map(|file| file.file_name()).map(|n| n.to_string_lossy());
         let names: Vec<_> = names.collect();
-        return format!("  wrote {}/: {}\n", folder.display(), names.join(", "));
+        let (to, names) = (format!("  wrote {}/:", folder.display()), names.join(", "));
+        let is_short = to.chars().count() + 1 + names.len() <= usize::from(NARROW);
+        let below = || format!("{to}\n{}", wrapped(&names, "    ", NARROW));
+        return if is_short { format!("{to} {names}\n") } else { below() };
     }
     files.iter().map(|file| format!("  wrote {}\n", file.display())).collect()
 }
@@ -51,6 +55,13 @@ pub(super) fn spare(name: &str, to: &Path, inputs: &[&Path]) -> Result<(), Failu
         return Err(Failure::input(format!("{name} {to}: is read by this command: name another")));
     }
     Ok(())
+}
+
+/// Refuses to write to `to` what its name does not end in.
+pub(super) fn ends_in(name: &str, to: &Path, ending: &str) -> Result<(), Failure> {
+    let why = || format!("{name} {}: expected a name that ends in .{ending}", to.display());
+    let is_so = to.extension().is_some_and(|found| found == ending);
+    is_so.then_some(()).ok_or_else(|| Failure::input(why()))
 }
 
 /// Prints `text`. A reader that closes the pipe early is no error.

@@ -136,6 +136,7 @@ pub fn act(args: &Args, store: &mut impl Store) -> Result<Outcome, Failure> {
         }
         Action::Save { to } => {
             output::spare("save", to, &[args.file.as_deref().unwrap_or(&args.flash)])?;
+            output::ends_in("save", to, "toml")?;
             write_text(to, &scenario.to_toml())?;
             show(args, &held, false, &[], None)
         }

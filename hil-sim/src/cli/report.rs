@@ -55,10 +55,15 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     let log = log_at(&args.log);
     let others: Vec<PathBuf> = args.others.iter().map(|other| log_at(other)).collect();
     let inputs: Vec<&Path> = others.iter().chain([&log]).map(PathBuf::as_path).collect();
-    let outputs =
-        [("--out", &args.out), ("--picture", &args.picture), ("--animation", &args.animation)];
-    for (name, to) in outputs {
-        to.as_ref().map_or(Ok(()), |to| output::spare(name, to, &inputs))?;
+    let outputs = [
+        ("--out", &args.out, "html"),
+        ("--picture", &args.picture, "svg"),
+        ("--animation", &args.animation, "svg"),
+    ];
+    for (name, to, ending) in outputs {
+        let Some(to) = to else { continue };
+        output::spare(name, to, &inputs)?;
+        output::ends_in(name, to, ending)?;
     }
     let boots = recordings(&log).map_err(Failure::input)?;
     match (&others[..], &args.picture) {
@@ -91,7 +96,7 @@ fn one(args: &Args, log: &Path, boots: &[Recording]) -> Result<Outcome, Failure>
     let human = || {
         let one = |(n, boot): (usize, &Recording)| {
             let text = terminal::run(&boot.summary, &[], args.verbose);
-            format!("start {} of {}: {text}", n + 1, boots.len())
+            format!("start {} of {}\n{text}", n + 1, boots.len())
         };
         boots.iter().enumerate().map(one).collect::<String>() + &output::wrote(&files)
     };

@@ -103,10 +103,18 @@ pub(super) fn seed(text: &str) -> Result<u64, &'static str> {
 }
 
 impl RunArgs {
-    /// Refuses a strategy where `what` needs none.
-    pub(super) fn no_controller(&self, what: &str) -> Result<(), Failure> {
-        self.controller.as_ref().map_or(Ok(()), |name| {
-            Err(Failure::input(format!("--controller {name}: has no effect, as {what}")))
+    /// Refuses the option `controller` or `seed`, and its key, where it has no effect.
+    pub(super) fn without(&self, option: &str, because: &str) -> Result<(), Failure> {
+        let given = match option {
+            "controller" => self.controller.clone(),
+            _ => self.seed.map(|seed| seed.to_string()),
+        };
+        let key = format!("run.{option}=");
+        let set = self.scenario.set.iter().find(|set| set.starts_with(&key));
+        let found = given.map(|value| format!("--{option} {value}"));
+        let found = found.or_else(|| set.map(|set| format!("--set {set}")));
+        found.map_or(Ok(()), |found| {
+            Err(Failure::input(format!("{found}: has no effect, as {because}")))
         })
     }
 

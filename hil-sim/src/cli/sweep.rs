@@ -72,7 +72,8 @@ struct Measure {
 
 pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     if args.crossing {
-        args.run.no_controller("speed and preload of a crossing are given")?;
+        args.run.without("controller", "speed and preload of a crossing are given")?;
+        args.run.without("seed", "a crossing has no noise")?;
     }
     let base = args.run.resolve()?;
     let axes = axes(args, &base)?;
@@ -86,10 +87,10 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     let campaign = Campaign {
         steps: (if args.crossing { "crossings" } else { "runs" }, 1),
         cases: points.iter().zip(&places).collect(),
-        run: Box::new(|(point, place): &(&Point, &Vec<&str>), done| {
+        run: Box::new(|(point, place): &(&Point, &Vec<&str>), watch| {
             let row = sweep::row(&axes, place, point.found(args.method)?);
-            done();
-            Ok::<Row, Failure>(row)
+            (watch.done)();
+            Ok::<_, Failure>(Some(row))
         }),
         fold: Box::new(|lines| lines.into_iter().map(|(_, row)| row).collect::<Vec<Row>>()),
     };

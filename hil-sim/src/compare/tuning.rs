@@ -12,22 +12,22 @@ pub(super) const MOST_TRIES: usize = 11;
 
 /// The entry, and what belongs to it, with the least reserve at which the worst gap is the
 /// reference. Where the gap first falls below it on the ladder, the Illinois variant of regula
-/// falsi goes on. Where no reserve suffices, the entry with the least gap is not tuned, nor is
-/// the one without reserve where none is needed.
+/// falsi goes on. Where no reserve suffices, the entry with the least gap is not tuned, nor is the
+/// one without reserve where none is needed. None if an evaluation was given up.
 pub(super) fn tune<T>(
     reference: f64,
-    evaluate: impl Fn(f64) -> Result<(Entry, T), RunError>,
-) -> Result<(Entry, T), RunError> {
+    evaluate: impl Fn(f64) -> Result<Option<(Entry, T)>, RunError>,
+) -> Result<Option<(Entry, T)>, RunError> {
     let off = |entry: &Entry| entry.worst_gap_mm.map_or(f64::INFINITY, |gap| gap / reference - 1.0);
     let tuned = |found: (Entry, T)| (Entry { tuned: true, ..found.0 }, found.1);
     let mut best: Option<(Entry, T)> = None;
     // Reserves and their gaps over the reference: above it, then below.
     let (mut wide, mut safe) = (None, None);
     for reserve in LADDER {
-        let found = evaluate(reserve)?;
+        let Some(found) = evaluate(reserve)? else { return Ok(None) };
         let f = off(&found.0);
         if f.abs() <= TUNED_WITHIN {
-            return Ok(tuned(found));
+            return Ok(Some(tuned(found)));
         }
         if best.as_ref().is_none_or(|best| f < off(&best.0)) {
             best = Some(found);
@@ -39,16 +39,16 @@ pub(super) fn tune<T>(
         wide = Some((reserve, f));
     }
     let mut best = best.expect("the ladder has rungs");
-    let (Some(mut wide), Some(mut safe)) = (wide, safe) else { return Ok(best) };
+    let (Some(mut wide), Some(mut safe)) = (wide, safe) else { return Ok(Some(best)) };
     for _ in LADDER.len()..MOST_TRIES {
         let part = (safe.1 / (safe.1 - wide.1)).clamp(0.02, 0.98);
         // Without a gap there is nothing to interpolate.
         let part = if wide.1.is_finite() { part } else { 0.5 };
         let reserve = safe.0 + part * (wide.0 - safe.0);
-        let found = evaluate(reserve)?;
+        let Some(found) = evaluate(reserve)? else { return Ok(None) };
         let f = off(&found.0);
         if f.abs() <= TUNED_WITHIN {
-            return Ok(tuned(found));
+            return Ok(Some(tuned(found)));
         }
         if f < 0.0 {
             safe = (reserve, f);
@@ -60,7 +60,7 @@ pub(super) fn tune<T>(
             safe.1 *= 0.5;
         }
     }
-    Ok(best)
+    Ok(Some(best))
 }
 
 #[cfg(test)]
@@ -75,9 +75,9 @@ mod tests {
         let found = tune(2.0, |reserve| {
             tries.set(tries.get() + 1);
             let worst_gap_mm = Some(gap(reserve));
-            Ok((Entry { gap_reserve: Some(reserve), worst_gap_mm, ..Entry::default() }, ()))
+            Ok(Some((Entry { gap_reserve: Some(reserve), worst_gap_mm, ..Entry::default() }, ())))
         });
-        (found.unwrap().0, tries.get())
+        (found.unwrap().expect("tuned").0, tries.get())
     }
 
     #[test]

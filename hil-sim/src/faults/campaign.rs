@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::judge::{Finding, Judge};
-use crate::campaign::Campaign;
+use crate::campaign::{Campaign, Watch};
 use crate::plant::rig::VirtualRig;
 use crate::scenario::Scenario;
 use crate::scenario::injection::{Injection, Kind, Target};
@@ -139,11 +139,11 @@ impl FaultCampaign {
         rigs: &'a Rigs,
         watched: impl Fn(&Scenario, &Twin) -> Result<Instant, E> + Sync + 'a,
     ) -> Campaign<'a, Case, MatrixRow, Outcome, E> {
-        let row = move |case: &Case, done: &(dyn Fn() + Sync)| {
+        let row = move |case: &Case, watch: Watch| {
             let one = |(instant, (rig, twin)): (usize, &(Scenario, Twin))| {
                 let scenario = case.scenario(rig, twin, instant);
                 let found = watched(&scenario, twin);
-                done();
+                (watch.done)();
                 found.unwrap_or_else(|error| Instant {
                     seed: scenario.run.seed,
                     during: "at rest".into(),
@@ -153,7 +153,7 @@ impl FaultCampaign {
                 })
             };
             let instants: Vec<Instant> = rigs.par_iter().enumerate().map(one).collect();
-            Ok(MatrixRow::of(case, &instants))
+            Ok(Some(MatrixRow::of(case, &instants)))
         };
         let fold = move |lines: Vec<(Case, MatrixRow)>| {
             let rows = lines.into_iter().map(|(_, row)| row).collect();

@@ -299,7 +299,7 @@ fn drawn(plant: &PlantParameters, scenario: &Scenario) -> Map<String, Value> {
         ("preload.slew_n_per_s", json!(plant.slew_n_per_s)),
         ("preload sensor gain", json!(plant.sensors.preload_sensor_gain)),
         ("compression sensor gain", json!(plant.sensors.tread_gain)),
-        ("arm angle zero, deg", json!(plant.sensors.angle_zero_rad.to_degrees())),
+        ("arm angle zero, deg", json!(plant.sensors.angle_zero_rad.to_degrees() + 0.0)),
     ];
     let mut all: Map<String, Value> =
         drawn.into_iter().map(|(key, value)| (key.to_owned(), value)).collect();

@@ -98,8 +98,23 @@ fn measured(run: &Run) -> Recording {
         log.push(LogLine { t_s, text: text(&entry.event) });
         summary.take(t_s, &entry.event);
     }
+    // The end of a run that a restart or a cut follows at once is in the log's lines alone.
+    let modes = run.events.iter().filter_map(|entry| match entry.event {
+        Event::Mode(mode) => Some((entry.at, mode)),
+        _ => None,
+    });
+    let later = modes.last().filter(|(at, _)| run.rows.last().is_some_and(|row| row.tick < *at));
+    summary.completed |= later.is_some_and(|(_, mode)| matches!(mode, Mode::Complete(_)));
     summary.completed &= summary.faults.is_empty();
     summary.crossings = run.ledger.iter().map(|line| crossing(run, line)).collect();
+    let mut levels = run.rows.iter().filter(|row| row.mode().is_some_and(Mode::moves));
+    let levels = levels.next().zip(levels.next_back());
+    let passed = levels.map_or(0, |(first, last)| usize::from(first.level.abs_diff(last.level)));
+    if passed > summary.crossings.len() {
+        let left = counted(passed - summary.crossings.len(), "crossing");
+        let why = "the controller reports them on the way to the next step";
+        summary.missing.push(format!("figures of {left}: {why}"));
+    }
     let gaps = summary.crossings.iter().filter_map(|line| line.gap_measured_mm);
     summary.max_gap_mm = gaps.fold(f64::NAN, f64::max);
     if !summary.crossings.is_empty() {

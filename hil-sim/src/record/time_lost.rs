@@ -36,11 +36,12 @@ impl TimeLost {
         most.map_or_else(String::new, |(s, what)| format!("{what} ({s:.2} s)"))
     }
 
+    /// The parts in ms, and the sum of what is printed.
     pub fn sentence(&self) -> String {
-        let Self { cruise_s, preload_s, approach_s, crossing_s, end_s } = *self;
-        let sum_s = cruise_s + preload_s + approach_s + crossing_s + end_s;
-        let [sum, cruise, preload, approach, crossing, end] =
-            [sum_s, cruise_s, preload_s, approach_s, crossing_s, end_s].map(|s| number(s, 3));
+        let parts_s = [self.cruise_s, self.preload_s, self.approach_s, self.crossing_s, self.end_s];
+        let parts_s = parts_s.map(|s| (s * 1e3).round() / 1e3);
+        let sum = number(parts_s.iter().sum::<f64>(), 3);
+        let [cruise, preload, approach, crossing, end] = parts_s.map(|s| number(s, 3));
         format!(
             "{sum} s = {cruise} s for the travel at cruise speed + {preload} s until the preload \
              carries the wheel + lost by going slower: {approach} s before the steps + \

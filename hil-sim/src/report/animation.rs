@@ -67,8 +67,11 @@ fn at_the_steps(scene: &Scene) -> String {
     let at =
         scene.crossings.iter().map(|c| format!("{} N at step {}", number(c.preload_n, 1), c.index));
     match at.collect::<Vec<_>>().join(", ") {
-        at if at.is_empty() => format!("The smooth wall's preload is {cruise_n} N."),
-        at => format!("Here it was {at}; on the smooth wall {cruise_n} N are wanted."),
+        at if at.is_empty() => format!("Without a step {cruise_n} N are wanted."),
+        at => format!(
+            "Here it was {at}. Without a step {cruise_n} N are wanted; between steps too close to \
+             fall and rise again it stays up."
+        ),
     }
 }
 
@@ -78,12 +81,12 @@ fn legend(scene: &Scene) -> String {
 controller measured or estimated, the clearance follows from them, and the forces of corner and \
 wall are not measured."
     } else {
-        "Arrows: preload on the axle, force of the wall under it, force of the corner, drawn from \
-the edge towards the axle. The second picture is the corner, five times as large: the areas are the forces \
+        "Arrows: preload on the axle, force of the wall under it (preload, and what the inclined arm adds), force of the corner, drawn \
+from the edge towards the axle. The second picture is the corner, five times as large: the areas are the forces \
 of wall and corner, spread as deep as the tread is pressed in, the arc is the reference gap."
     };
     format!(
-        "{forces} Lengths are true to scale, the pillar is at the top. Dashed: the undeformed \
+        "{forces} In each picture lengths are true to scale; the pillar is at the top. Dashed: the undeformed \
 wheel; the sleeve covers what is pressed flat. The spring shortens by its true deflection; its \
 length, the hub and the screw are only drawn. A click in a plot goes to its instant."
     )

@@ -1,5 +1,4 @@
-//! Each crossing enlarged: half a second before the corner touches until just after
-//! lift-off.
+//! Each crossing enlarged: from just before the corner touches until just after lift-off.
 
 use super::axis;
 use super::palette;
@@ -8,9 +7,9 @@ use super::panels::{Across, View, figure};
 use crate::record::{CrossingLine, Recording};
 
 /// Shown before the corner touches, s.
-const BEFORE_S: f64 = 0.5;
+const BEFORE_S: f64 = 0.15;
 /// Shown after lift-off, s.
-const AFTER_S: f64 = 0.8;
+const AFTER_S: f64 = 0.25;
 /// Size of a plot, CSS pixels.
 const SIZE: (u32, u32) = (540, 250);
 

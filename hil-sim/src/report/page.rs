@@ -50,9 +50,12 @@ pub fn html(recording: &Recording, more: &[Section]) -> String {
         &format!(
             "{}<p class=\"note\">The gap of a crossing is the clearance between the step root \
 and the undeformed wheel at the instant at which the lower wall stops carrying load (on retraction: \
- begins to). {} Lead: how long before the corner touched the preload was reached; negative: how long \
-after that it was missing. Slowed by: what keeps the crossing from being faster; by the preload slew \
-if more preload would take longer to build than it saves.</p>\n",
+ begins to). {} A gap below the reference is safe; it costs a little time, as the plan takes the tread \
+stiffer than it is known. Speed: before lift-off, by the travel of the last half millimetre. Lead: how \
+long before the corner touched the preload was reached; negative: how long after that it was missing. \
+Slowed by: what keeps the crossing from being faster. The preload limit: all preload is used that the \
+largest one leaves, less the sensor's error and what the climb adds; the preload slew: more would take \
+longer to build than it saves.</p>\n",
             tables::ledger(&s.crossings),
             if s.measured {
                 "This log is a controller's: every figure is measured or estimated by it, and where \
@@ -175,15 +178,9 @@ fn plots(recording: &Recording) -> String {
     }
     let time = stack(recording, Across::Time);
     let position = stack(recording, Across::Position);
-    let hidden_s = Across::Time.range(&recording.rows).0;
     let s = &recording.summary;
-    let from = s.duration_s.filter(|_| hidden_s > recording.rows[0].controller.t_s);
-    let from = from.map_or_else(String::new, |duration_s| {
-        format!(
-            " The preload carries the wheel from {:.2} s; before {hidden_s:.2} s the run, at rest, \
-is in the log's tables only.",
-            duration_s - s.moving_s
-        )
+    let from = s.duration_s.map_or_else(String::new, |duration_s| {
+        format!(" The preload carries the wheel from {:.2} s.", duration_s - s.moving_s)
     });
     let commanded = s.commanded_s.is_some();
     let zero = if commanded { "the command" } else { "the start of the controller" };

@@ -5,12 +5,8 @@ use plotters::style::RGBColor;
 use super::axis;
 use super::palette;
 use super::panel::{Line, Look, Marks, Panel, Rule, Shape, stacked};
+use super::verdict::GAP_TOLERANCE;
 use crate::record::{CrossingLine, Recording, Report, Tick};
-
-/// Largest part of the time axis before the first motion.
-const BEFORE_MOTION: f64 = 0.12;
-/// Travel that counts as motion, mm.
-const MOTION_MM: f64 = 0.01;
 
 /// Size of the overview, CSS pixels.
 const OVERVIEW: (u32, u32) = (1000, 820);
@@ -66,26 +62,17 @@ impl Across {
         if let Self::Since(start_s) = self { start_s } else { 0.0 }
     }
 
-    /// Range of the rows. Over time it begins shortly before the first motion.
+    /// Range of the rows. Over time it begins at zero, the command, if they go beyond.
     pub(super) fn range(self, rows: &[Tick]) -> (f64, f64) {
-        let range = axis::extent(rows.iter().map(|row| self.of(row))).unwrap_or((0.0, 1.0));
+        let (low, high) = axis::extent(rows.iter().map(|row| self.of(row))).unwrap_or((0.0, 1.0));
         match self {
             Self::Time | Self::Since(_) => {
-                let end = range.1.max(range.0 + 1e-3);
-                let motion = motion(rows).map(|row| self.of(row));
-                let before =
-                    |start: f64| start - BEFORE_MOTION / (1.0 - BEFORE_MOTION) * (end - start);
-                (motion.map_or(range.0, |start| before(start).max(range.0)), end)
+                let from = if high > 0.0 { low.max(0.0) } else { low };
+                (from, high.max(from + 1e-3))
             }
-            Self::Position => axis::padded(range, 0.01),
+            Self::Position => axis::padded((low, high), 0.01),
         }
     }
-}
-
-/// The first row in motion; none if nothing moves.
-pub(super) fn motion(rows: &[Tick]) -> Option<&Tick> {
-    let first = rows.iter().map(Tick::position_mm).find(|position| position.is_finite())?;
-    rows.iter().find(|row| (row.position_mm() - first).abs() > MOTION_MM)
 }
 
 /// The run as the plots need it.
@@ -221,11 +208,14 @@ impl<'a> View<'a> {
             self.marks("measured", (Shape::Ring, palette::GAP), |c| Some(c.gap_measured_mm? / one)),
             self.marks("true gap", (Shape::Dot, palette::TRUTH), |c| Some(c.gap_mm / one)),
         ];
-        panel.levels =
-            reference_mm.map(|_| ("reference gap", Look::Limit, 100.0)).into_iter().collect();
+        let most = 100.0 * (1.0 + GAP_TOLERANCE);
+        if reference_mm.is_some() {
+            panel.levels =
+                vec![("reference gap", Look::Wanted, 100.0), ("tolerance", Look::Limit, most)];
+        }
         // The clearance before touch and after the climb is unrelated to the gap.
         let gaps = panel.marks.iter().flat_map(|marks| &marks.points).map(|point| point.1);
-        let shown = gaps.chain(reference_mm.map(|_| 100.0)).filter(|&gap| gap > 0.0);
+        let shown = gaps.chain(reference_mm.map(|_| most)).filter(|&gap| gap > 0.0);
         let range = axis::extent(shown);
         panel.y = range.map(|(low, high)| {
             let room = (0.15 * (high - low)).max(0.01 * high);
@@ -246,7 +236,7 @@ impl<'a> View<'a> {
     }
 
     pub(super) fn slip_margin(&self) -> Panel {
-        let mut panel = self.panel("Slip margin", "unused, ratio");
+        let mut panel = self.panel("Slip margin", "friction unused, ratio");
         panel.least_span = 0.2;
         panel.lines = vec![
             self.line("by the model", Look::Estimate(palette::SLIP), |row| {
@@ -318,8 +308,10 @@ fn reports(recording: &Recording, across: Across) -> Vec<Rule> {
     faults.chain(limits).map(rule).collect()
 }
 
-/// Speed, preload, gap and radius of a run over time, stacked, as an SVG of 1000 x 820.
+/// Speed, preload, gap and radius of a run over time from the command on, stacked, as an SVG of
+/// 1000 x 820.
 pub fn overview_svg(recording: &Recording) -> String {
+    let recording = &recording.since_command();
     let view = View::new(recording, Across::Time);
     stacked(OVERVIEW, &mut [view.speed(), view.preload(), view.gap(), view.radius()])
 }

@@ -119,6 +119,7 @@ const plots = (() => {
         const from = label.getBBox().x, to = from + label.getBBox().width;
         const free = from >= low && to <= high && taken.every(([a, b, y]) => y !== more.y || from >= b || to <= a);
         if (free) taken.push([from - 4, to + 4, more.y]); else label.remove();
+        return free;
       };
       labels.replaceChildren();
       for (const rule of all(".rule").sort((a, b) => (a.dataset.name < b.dataset.name ? -1 : 1))) {
@@ -129,7 +130,8 @@ const plots = (() => {
       for (const { x: start, width: long, lane, name } of bands) {
         const [low, high] = [Math.max(left, pixel(start)), Math.min(end, pixel(start + long))];
         const more = { y: top + (lane + 0.5) / -full.y[0] * down + 4, fill: "#1f2937", "text-anchor": "middle" };
-        if (high > low) add(name, (low + high) / 2, more, low, high);
+        // Where its name has no room, a stage has its number.
+        if (high > low) add(name, (low + high) / 2, more, low, high) || add(parseInt(name) || "", (low + high) / 2, more, low, high);
       }
       if (at !== null) show(at);
     }

@@ -87,7 +87,7 @@ function phase(scene, row) {
   }
   if (t < next.lift_s) {
     return state + at + (scene.retracts ? "the wheel rolls over the edge and down; the lower wall does not carry yet."
-      : "the edge takes the load from the lower wall. What the rubber does not fill at lift-off is the gap.");
+      : "the edge takes over the load from the lower wall. At lift-off the open distance is the gap.");
   }
   const gap = `${said}gap ${n(next.gap_mm, 2)} mm (reference ${n(scene.gap_ref_mm, 2)} mm)`;
   if (scene.retracts) return `${state}${at}the lower wall carries again, ${gap}.`;
@@ -99,7 +99,7 @@ function start(scene) {
   const set = (id, attributes) => {
     for (const name in attributes) $(id).setAttribute(name, attributes[name]);
   };
-  const g = scene.geometry, r = g.wheel_radius_mm, first = scene.rows[0][0];
+  const g = scene.geometry, r = g.wheel_radius_mm, first = Math.max(0, scene.rows[0][0]);
   const last = scene.rows[scene.rows.length - 1][0];
   const near = { width: 84, height: 84 }, far = { width: 176, height: 176 };
   let from = first, to = last, now = first, frame = null;
@@ -184,7 +184,7 @@ function start(scene) {
     const next = current(scene, now) || scene.crossings[scene.crossings.length - 1];
     const at = next ? next.face_mm : p.edge ? p.edge[0] : p.x, upper = wallAt(g, at), lower = upper - (next ? next.step_mm : 0);
     const size = near.width / 5, small = 12.5 * size / ($("inset").clientWidth || 500);
-    set("inset", { viewBox: `${at - 0.62 * size} ${-(lower + 0.62 * size)} ${size} ${size}` });
+    set("inset", { viewBox: `${at - 0.86 * size} ${-(lower + 0.62 * size)} ${size} ${size}` });
     const path = (points) => (points.length ? `M${points.map(([x, y]) => `${x},${-y}`).join("L")}Z` : "");
     const along = (from, to) => [...Array(41).keys()].map((i) => [0, 1].map((k) => from[k] + (to[k] - from[k]) * i / 40));
     const floor = along([Math.min(p.x - 8, at), p.floor], [p.x < at ? Math.min(p.x + 8, at) : p.x + 8, p.floor]);
@@ -198,7 +198,7 @@ function start(scene) {
     set("insetoutline", { r, cx: p.x, cy: -p.y });
     set("insetgap", { d: gap === null ? "" : $("gapline").getAttribute("d") });
     $("insettext").textContent = gap === null ? "" : `${gap.toFixed(2)} mm`;
-    label("insettext", at + 0.4, lower + 0.4, "start", small);
+    label("insettext", at + 0.13 * size, lower - 1.4 * small, "end", small);
   }
 
   // A pick in a plot goes to its instant.

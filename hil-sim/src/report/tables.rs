@@ -99,7 +99,7 @@ pub(super) fn reports(s: &Summary) -> String {
     let injected = s.injected.iter().map(|fault| format!("<p>Injected: {}.</p>\n", escape(fault)));
     let injected: String = injected.collect();
     if all.is_empty() {
-        return injected + "<p>No fault, no limit.</p>\n";
+        return injected + "<p>No fault (code 101 to 160), no limit (code from 200).</p>\n";
     }
     let rows = all.iter().map(|(kind, r)| {
         vec![

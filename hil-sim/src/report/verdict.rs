@@ -40,12 +40,13 @@ pub(crate) fn verdict(summary: &Summary) -> String {
     let why = match Grade::of(summary) {
         Grade::Good if summary.gap_ref_mm > 0.0 => {
             let most = 100.0 * GAP_TOLERANCE;
-            format!("good: every gap at most {most:.0} % over the reference, no slip")
+            let slip = if summary.measured { "" } else { ", no slip" };
+            format!("good: every gap at most {most:.0} % over the reference{slip}")
         }
-        Grade::Good => "good: no slip".to_owned(),
+        Grade::Good => "good".to_owned(),
         _ => reservations(summary).join(", "),
     };
-    let slow = summary.lost.as_ref().map(|lost| format!("slow because {}", lost.main()));
+    let slow = summary.lost.as_ref().map(|lost| format!("slow above all because {}", lost.main()));
     [Some(why).filter(|why| !why.is_empty()), slow]
         .into_iter()
         .flatten()
@@ -122,7 +123,10 @@ pub(crate) fn headline(summary: &Summary) -> String {
     });
     let travel = format!("{:.1} mm in {time}, {crossings}", summary.travel_mm);
     match (summary.completed, summary.faults.first()) {
-        (true, None) => format!("{verb} {travel}"),
+        (true, None) => {
+            let then = summary.restart.as_ref().map(|cause| format!("; then a restart: {cause}"));
+            format!("{verb} {travel}{}", then.unwrap_or_default())
+        }
         (true, Some(fault)) => {
             format!("{verb} {travel}, with fault {}: {}", fault.code, fault.text)
         }
@@ -210,7 +214,7 @@ mod tests {
         (summary.gap_ref_mm, summary.max_gap_mm) = (2.0, 2.059);
         assert_eq!(Grade::of(&summary), Grade::Good);
         assert!(verdict(&summary).starts_with("good: every gap at most 3 % over the reference"));
-        assert!(verdict(&summary).contains("; slow because "), "{}", verdict(&summary));
+        assert!(verdict(&summary).contains("; slow above all because "), "{}", verdict(&summary));
         summary.max_gap_mm = 2.061;
         assert_eq!(Grade::of(&summary), Grade::Fair);
         assert_eq!(reservations(&summary), ["over the reference gap"]);

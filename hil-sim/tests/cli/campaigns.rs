@@ -224,22 +224,32 @@ fn the_rows_of_a_campaign_are_written_as_a_table() {
 
 /// Ends a campaign by Ctrl-C once it has begun, as a terminal does.
 #[cfg(unix)]
-#[test]
-fn ctrl_c_keeps_what_is_done_and_says_that_it_is_partial() {
+fn interrupted(arguments: &[&str], after_s: u64) -> std::process::Output {
     let child = std::process::Command::new(env!("CARGO_BIN_EXE_rig"))
-        .args(["montecarlo", "-n", "1000000", "--json"])
+        .args(arguments)
         .stdout(std::process::Stdio::piped())
+        .stderr(std::process::Stdio::piped())
         .spawn()
         .expect("the command starts");
-    std::thread::sleep(std::time::Duration::from_secs(4));
+    std::thread::sleep(std::time::Duration::from_secs(after_s));
     let id = child.id().to_string();
     let interrupted = std::process::Command::new("kill").args(["-INT", &id]).status();
     assert!(interrupted.expect("kill").success());
-    let output = child.wait_with_output().expect("it ends");
+    child.wait_with_output().expect("it ends")
+}
+
+#[cfg(unix)]
+#[test]
+fn ctrl_c_keeps_what_is_done_and_says_that_it_is_partial() {
+    let output = interrupted(&["montecarlo", "-n", "1000000", "--json"], 4);
     assert_eq!(code(&output), 1, "{}", stderr(&output));
     let found = object(&output);
     let done = number(&found["partial"], "done");
     assert!((1.0..1e6).contains(&done) && number(&found["partial"], "of") == 1e6);
     assert_eq!(number(&found, "runs"), done);
     assert_eq!(found["campaign"]["lines"].as_array().expect("lines").len() as f64, done);
+    // A comparison gives up the strategies under way: each has a thousand rigs.
+    let output = interrupted(&["compare", "-n", "1000", "--json"], 1);
+    assert_eq!(code(&output), 1);
+    assert!(stderr(&output).contains("interrupted before the first of 4 cases"));
 }

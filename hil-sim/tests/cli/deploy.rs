@@ -83,8 +83,9 @@ fn files_go_to_the_given_directory_and_a_table_is_printed() {
     let output = rig_in(directory.path(), &["deploy", "--out", "mine/run"]);
     assert_eq!(code(&output), 0);
     let text = stdout(&output);
-    assert!(text.starts_with("Deployed "), "{text}");
-    assert!(text.contains("wrote mine/run/: report.html"), "{text}");
+    assert!(text.starts_with("Deployed ") && text.contains("  good: every gap "), "{text}");
+    assert!(text.contains("  wrote mine/run/:\n    report.html, log.csv, "), "{text}");
+    assert!(text.lines().all(|line| line.chars().count() <= 80), "{text}");
     assert!(directory.path().join("mine/run/log.csv").is_file());
     assert!(!directory.path().join("out").exists());
 }

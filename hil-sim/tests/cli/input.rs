@@ -59,6 +59,8 @@ fn options_are_checked_by_name() {
         ("capture --seconds -3", &["--seconds", "-3", "a number above 0"]),
         ("capture --name ../x", &["--name ../x", "without a folder"]),
         ("compare --controller limit", &["--controller limit", "no effect"]),
+        ("compare --set run.controller=limit", &["--set run.controller=limit", "no effect"]),
+        ("sweep --crossing --seed 5 --key tread.tau_s=1,2", &["--seed 5", "no effect"]),
         ("envelope --controller limit", &["--controller limit", "no effect"]),
         ("sweep --crossing --controller limit", &["--controller limit", "no effect"]),
         ("stress -n 1000000000", &["--cases <CASES>", "1000000000"]),

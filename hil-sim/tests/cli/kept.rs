@@ -121,6 +121,10 @@ fn no_command_writes_over_what_it_reads() {
     let set = std::fs::read(at.join("set.bin")).unwrap();
     refused_in(at, &["params", "save", "set.bin", "--file", "set.bin"], &["save set.bin"]);
     assert_eq!(set, std::fs::read(at.join("set.bin")).unwrap());
+    // A page does not replace what is no page, nor a scenario what is no scenario.
+    refused_in(at, &["report", "run", "--out", "run/summary.json"], &["run/summary.json", ".html"]);
+    refused_in(at, &["params", "save", "other.mcap", "--file", "set.bin"], &["save other.mcap"]);
+    assert!(log == std::fs::read(at.join("other.mcap")).unwrap());
     // A folder stands for the log in it.
     let page = good(at, &["report", "run", "--json"]);
     assert!(at.join("run/log.html").is_file(), "{}", stdout(&page));

@@ -128,14 +128,19 @@ fn a_log_with_resets_is_shown_start_by_start() {
     }
     let page = std::fs::read_to_string(at.join("log.html")).expect("a page");
     assert!(page.contains("10 starts of the controller"));
-    let said = ["Restarted after ", "Ended by a restart: "].map(|text| page.matches(text).count());
-    assert!(said[0] + said[1] == 9 && !page.contains(" - mm"), "{said:?}");
+    let ends = ["Restarted after ", "; then a restart: ", "Ended by a restart: "];
+    let said: usize = ends.iter().map(|text| page.matches(text).count()).sum();
+    assert!(said == 9 && !page.contains(" - mm"), "{said}");
     assert!(page.contains("<h2>Start 10 of 10</h2>"));
     // The cause is the target's own word.
     let cause = starts[0]["restart"].as_str().expect("a cause");
     assert!(cause.contains("before: "), "{cause}");
     assert!(starts[9]["restart"].is_null());
     refused_in(at, &["report", "log.mcap", "log.mcap"], &["log.mcap: 10 starts"]);
+    // An arrival that the log's lines alone still have, and a step whose figures never came.
+    assert_eq!(starts[1]["completed"], true, "{}", starts[1]);
+    let missing = starts[0]["missing"].to_string();
+    assert!(starts[0]["completed"] == false && missing.contains("figures of 1 crossing"));
 }
 
 /// The log's line of a crossing and the ledger's have one lead.

@@ -17,13 +17,10 @@ fn every_axis_has_its_unit() {
 }
 
 #[test]
-fn the_build_up_of_the_preload_takes_a_small_part_of_the_axes() {
-    let recording = example::deploy();
-    let view = View::new(&recording, Across::Time);
-    let rows = &recording.rows;
-    let start = rows.iter().find(|row| row.position_mm() > rows[0].position_mm() + 0.01).unwrap();
-    let part = (start.controller.t_s - view.x.0) / (view.x.1 - view.x.0);
-    assert!(part < 0.16, "{part} of the axis is before the first motion");
+fn the_time_axis_begins_at_the_command() {
+    let recording = example::deploy().since_command();
+    assert!(recording.rows[0].controller.t_s < -0.1);
+    assert_eq!(View::new(&recording, Across::Time).x.0, 0.0);
 }
 
 #[test]
