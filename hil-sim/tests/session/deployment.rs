@@ -77,12 +77,15 @@ fn every_drawn_rig_completes_without_fault_or_slip() {
 }
 
 #[test]
-fn a_wheel_with_the_whole_load_or_none_completes_both_ways() {
-    for (share, direction) in ["0", "1"].iter().flat_map(|share| DIRECTIONS.map(|d| (share, d))) {
-        let sets = [
-            format!("plant.top_load_share={share}"),
-            format!("run.direction={}", direction.name()),
-        ];
+fn a_rig_at_its_bounds_is_crossed_without_slip_both_ways() {
+    // The whole load or none; little friction, and the first step while the preload still rises.
+    let little =
+        ["16", "19", "20", "24"].map(|at| format!("mu=0.8 rig.step_positions_mm=[{at},44,66]"));
+    let rigs =
+        ["top_load_share=0", "top_load_share=1"].map(str::to_owned).into_iter().chain(little);
+    for (rig, direction) in rigs.flat_map(|rig| DIRECTIONS.map(|to| (rig.clone(), to.name()))) {
+        let sets = format!("plant.{rig} run.direction={direction}");
+        let sets: Vec<String> = sets.split(' ').map(str::to_owned).collect();
         let scenario = Scenario::resolve(Some("prototype"), None, &sets).expect("a scenario");
         let summary = run(&scenario, Options::default()).expect("a run").summary;
         assert!(summary.completed && summary.slip_mm < NO_SLIP_MM, "{sets:?}: {summary:?}");

@@ -243,12 +243,16 @@ impl<'a, P: AsyncFnMut()> Search<'a, P> {
             let safe = between(self.planner.safe_speed, self.floor, self.ceiling);
             best = self.roll(window.max(safe), release, safe).await;
         } else if self.price(&course.rolled) > Q16::ZERO {
-            let fastest = course.approach.slowest_speed;
+            // A preload that still rises has more time where the wheel is slow before the corner, too.
+            let (fastest, rising) = (course.approach.slowest_speed, course.rolled.rising);
             for part in [q16(750_000), q16(500_000), q16(250_000), Q16::ZERO] {
-                let slower =
-                    self.roll(window, release, self.floor + (fastest - self.floor) * part).await;
-                if self.cost(&slower) < self.cost(&best) {
-                    best = slower;
+                let slowed = |speed: MillimetresPerSecond| self.floor + (speed - self.floor) * part;
+                let (slowest, windows) = (slowed(fastest), [window, slowed(window)]);
+                for &window in &windows[..1 + usize::from(rising)] {
+                    let slower = self.roll(window, release, slowest).await;
+                    if self.cost(&slower) < self.cost(&best) {
+                        best = slower;
+                    }
                 }
             }
         }
