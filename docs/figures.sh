@@ -14,12 +14,12 @@ write() {
 }
 wanted=$*
 write deploy deploy --out target/figures/deploy
-# Pictures of runs: a crossing, and three strategies with less friction than nominal. The constant
-# preload does not climb there, so that its run ends with 1.
+# Pictures of runs: a crossing, and three strategies with less friction than nominal, the steps
+# 60 mm apart. The constant preload does not climb there, so that its run ends with 1.
 case " $wanted " in *" picture "* | "  ")
     for controller in constant scheduled limit; do
-        cargo rig deploy --set plant.mu=0.8 --controller $controller \
-            --out target/figures/$controller || true
+        cargo rig deploy --set plant.mu=0.8 --controller $controller --set rig.travel_mm=180 \
+            --set 'rig.step_positions_mm=[20,80,140]' --out target/figures/$controller || true
     done
     cargo rig report target/figures/constant/log.mcap target/figures/scheduled/log.mcap \
         target/figures/limit/log.mcap --picture docs/deployment.svg

@@ -133,7 +133,7 @@ pub fn table(differences: &[Difference]) -> (Vec<String>, Vec<Vec<String>>) {
 }
 
 /// Size of the picture, CSS pixels: its text can still be read at 400.
-const PICTURE: (u32, u32) = (640, 860);
+const PICTURE: (u32, u32) = (700, 860);
 /// Colours of up to three.
 const COLOURS: [RGBColor; 3] = [palette::PRELOAD, palette::SPEED, palette::GAP];
 
