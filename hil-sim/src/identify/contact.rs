@@ -28,9 +28,10 @@ const BLOCKS: [usize; 3] = [16, 16, 4];
 /// drive's load between two counts, which raises the creep: 1.9, by the hidden rigs of
 /// seeds 1 to 10.
 const WIDENED: f64 = 1.18 * 1.9;
-/// Largest shift of logs of one rig, see [`agree`]: 3 on rigs as identified, 7 with what the
-/// controller is not told; 55 and more between rigs whose friction differs by a quarter.
-const AGREE: f64 = 20.0;
+/// Largest shift of logs of one rig, see [`agree`]: mostly 3 on rigs as identified, but up to 30
+/// where a fit ends in one of its small minima (2 of 120 rigs); 55 and more between rigs whose
+/// friction differs by a quarter.
+const AGREE: f64 = 40.0;
 /// Deviation of friction while nothing determines it, logarithm.
 const HELD_LN: f64 = 0.02;
 /// Deviation of the held creep law, logarithm.
