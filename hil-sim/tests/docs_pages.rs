@@ -192,8 +192,8 @@ fn the_drawings_are_what_their_script_writes() {
 #[test]
 fn the_results_are_those_of_the_figures() {
     let page = |path: &str| fs::read_to_string(root().join(path)).expect("a page");
-    let [results, readme, script] =
-        ["docs/RESULTS.md", "README.md", "docs/figures.sh"].map(|path| page(path));
+    let [results, readme] = [page("docs/RESULTS.md"), page("README.md")];
+    let script = page("docs/figures.sh");
     let read = |name: &str| -> serde_json::Value {
         serde_json::from_str(&page(&format!("docs/figures/{name}.json"))).expect("a figure")
     };

@@ -99,11 +99,12 @@ fn measured(run: &Run) -> Recording {
         summary.take(t_s, &entry.event);
     }
     // The end of a run that a restart or a cut follows at once is in the log's lines alone.
-    let modes = run.events.iter().filter_map(|entry| match entry.event {
+    let mut modes = run.events.iter().filter_map(|entry| match entry.event {
         Event::Mode(mode) => Some((entry.at, mode)),
         _ => None,
     });
-    let later = modes.last().filter(|(at, _)| run.rows.last().is_some_and(|row| row.tick < *at));
+    let later =
+        modes.next_back().filter(|(at, _)| run.rows.last().is_some_and(|row| row.tick < *at));
     summary.completed |= later.is_some_and(|(_, mode)| matches!(mode, Mode::Complete(_)));
     summary.completed &= summary.faults.is_empty();
     summary.crossings = run.ledger.iter().map(|line| crossing(run, line)).collect();
