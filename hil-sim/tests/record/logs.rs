@@ -137,10 +137,11 @@ fn an_hour_of_deploying_and_retracting_is_logged_without_a_gap() {
     // piece of a capture.
     assert!(largest < 2048 && waiting <= 2 * TICKS_PER_FRAME, "{largest} bytes, {waiting} ticks");
     // The plant's own ledger and what a run's trace keeps go with their session.
-    // Other tests of the process keep what they need meanwhile, but not in every session.
+    // Other tests of the process keep what they need meanwhile, but not in every session: of two
+    // sessions nothing follows.
     let mut more: Vec<u64> = memory.windows(2).map(|w| w[1].saturating_sub(w[0])).collect();
     more.sort_unstable();
-    assert!(more.get(more.len() / 2).is_none_or(|median| *median < (3 << 20)), "{memory:?}");
+    assert!(more.len() < 2 || more[more.len() / 2] < (3 << 20), "{memory:?}");
 }
 
 /// What Python finds in a file.
