@@ -388,6 +388,10 @@ fn every_strategy_runs_to_the_end() {
             assert!(summary.completed, "{name}");
             assert_eq!(summary.controller, kind.name());
             assert!(summary.slip_mm < NO_SLIP_MM, "{name}");
+            // The highest preload from the start on costs no time: nothing waits for it.
+            let own_s = strategy(ControllerKind::Scheduled, direction, None).moving_s;
+            let most = if kind == ControllerKind::Limit { 1.01 * own_s } else { f64::MAX };
+            assert!(summary.moving_s < most, "{name}: {} s, scheduled {own_s}", summary.moving_s);
             for line in &summary.crossings {
                 let part = line.gap_mm / summary.gap_ref_mm;
                 assert!((0.9..1.05).contains(&part), "{name}: {part}");
