@@ -57,7 +57,7 @@ pub(super) fn spare(name: &str, to: &Path, inputs: &[&Path]) -> Result<(), Failu
     Ok(())
 }
 
-/// Refuses to write to `to` what its name does not end in.
+/// Refuses to write to a file of another ending.
 pub(super) fn ends_in(name: &str, to: &Path, ending: &str) -> Result<(), Failure> {
     let why = || format!("{name} {}: expected a name that ends in .{ending}", to.display());
     let is_so = to.extension().is_some_and(|found| found == ending);

@@ -36,7 +36,7 @@ impl TimeLost {
         most.map_or_else(String::new, |(s, what)| format!("{what} ({s:.2} s)"))
     }
 
-    /// The parts in ms, and the sum of what is printed.
+    /// Each part to a millisecond, and the sum of the printed parts.
     pub fn sentence(&self) -> String {
         let parts_s = [self.cruise_s, self.preload_s, self.approach_s, self.crossing_s, self.end_s];
         let parts_s = parts_s.map(|s| (s * 1e3).round() / 1e3);
