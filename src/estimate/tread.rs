@@ -24,6 +24,8 @@ use crate::units::{
 /// deviations of 4 %, both sensors' gains by three of 0.5 %, `1.015^1.5 / (0.88 * 0.985)`, and the
 /// noise of what they zeroed, 0.01.
 const BAND: Ratio = q16(190_000);
+/// Error of the elements while the preload rises, 3 % of a load that may be 1.18 times the measured.
+const OF_ELEMENTS: Ratio = q16(36_000);
 /// Least preload at which it is compared, part of the cruise preload: the wheel rolls from about
 /// 0.4 of it on.
 const LEAST_PART: f64 = 0.3;
@@ -286,7 +288,8 @@ impl Tread {
             return false;
         }
         let most = preload + arm_thrust;
-        let off = meant > most + most * BAND || meant < preload - preload * BAND;
+        let band = BAND + OF_ELEMENTS;
+        let off = meant > most + most * band || meant < preload - preload * band;
         state.off = if off { state.off.saturating_add(1) } else { 0 };
         state.off == OFF_TICKS
     }

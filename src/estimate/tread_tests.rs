@@ -197,6 +197,14 @@ fn a_compression_sensor_that_is_a_fifth_off_is_reported() {
 }
 
 #[test]
+fn rubber_and_gains_at_their_bounds_are_not_reported() {
+    for gain in [1.0, 1.012, 1.0145, 1.015] {
+        assert_eq!(pressed("prototype", 0.88, 0.985, gain), None, "{gain}");
+        assert_eq!(pressed("prototype", 1.12, 1.015, 2.0 - gain), None, "{gain}");
+    }
+}
+
+#[test]
 fn what_the_arm_may_add_excuses_as_much() {
     let rig = Rig::prototype();
     let tread = Tread::try_build(&rig).expect("in range");
