@@ -258,13 +258,13 @@ proptest! {
             for _ in 0..u32::from(FORGETS + 2 * OFF_TICKS) {
                 tread.rest(&mut state, pressed, Q16::ZERO, Q16::ZERO);
             }
-            let (mut travel, mut speed) = (0.0, 8.0);
+            let (mut travel, mut speed, mut duty) = (0.0, 8.0, 0.0);
             let mass = 1e-3 * (rig.drive.reflected_mass_kg + rig.plant.moved_mass_kg);
             let shown = (0..2000).find_map(|_| {
                 speed += 1e-3 * speeds_up;
                 travel += 1e-3 * speed;
                 let force = load + mass * speeds_up + GEARBOX * rig.drive.stall_force_n;
-                let duty = speed / rig.drive.no_load_speed_mm_s
+                duty = speed / rig.drive.no_load_speed_mm_s
                     + force / rig.drive.stall_force_n;
                 let rolls = Rolls {
                     speed: Q16::from_num(speed),
@@ -276,7 +276,9 @@ proptest! {
             let shown = shown.expect("seen");
             let got = shown.load.expect("shows on the way out").to_num::<f64>();
             let sigma = shown.load_sigma.to_num::<f64>();
-            prop_assert!((got - load).abs() < 1.5 * sigma, "{got} of {load}, {sigma}");
+            // What the supply is off shows in the whole effort, the largest at the end.
+            let most = 0.25 * sigma + (1.0 / supply - 1.0).abs() * duty * rig.drive.stall_force_n;
+            prop_assert!((got - load).abs() < most, "{got} of {load}, {most}");
         }
     }
 }
