@@ -119,6 +119,8 @@ impl Estimator {
             }
             point.gap = measured.as_table;
             open.lift = Some(point);
+            // Closed at the end of travel, the wheel may still be on its corner.
+            state.leaving = Some(point.face);
         }
         state.crossing = None;
         open.gap = measured.gap;

@@ -12,9 +12,9 @@
 mod build;
 mod measure;
 
+use self::measure::is_clear;
 use crate::numeric::{LowPass, LowPassState, between, sqrt};
-use crate::units::Direction;
-use crate::units::{Millimetres, Q16, Ratio, Travel, q16};
+use crate::units::{Direction, Millimetres, Q16, Ratio, Travel, q16};
 
 /// Rise above which the baseline is held, mm: two steps of the angle code.
 const HOLD: Millimetres = q16(80_000);
@@ -87,8 +87,10 @@ pub struct WatchState {
     pub contact: Contact,
     /// Radius less compression on the wall, mm.
     baseline: LowPassState,
-    /// Travel at its last sample.
+    /// Travel at its last sample; off the wall that since which the ground is flat.
     sampled: Travel,
+    /// That ground, mm.
+    level: Millimetres,
     /// The same on the next wall.
     next: LowPassState,
     ticks: u8,
@@ -163,8 +165,8 @@ pub struct WatchInput {
     pub near: bool,
     /// By its travel the wheel is too far for the corner that it is on.
     pub over: bool,
-    /// The wheel is clear of the step behind.
-    pub clear: bool,
+    /// The wheel is clear of the step behind; none where only the ground can show that.
+    pub clear: Option<bool>,
 }
 
 impl CrossingWatch {
@@ -398,7 +400,8 @@ impl CrossingWatch {
             state.lift = Some(lift);
             return Some(CrossingEvent::Lifted(lift));
         }
-        if state.lift.is_some() && (rise >= self.step - OVER || seen.clear) {
+        let clear = is_clear(state, seen);
+        if state.lift.is_some() && (rise >= self.step - OVER || clear) {
             state.contact = Contact::Leaving;
             state.ticks = 0;
             return Some(CrossingEvent::Passed);
@@ -445,7 +448,7 @@ impl CrossingWatch {
             self.touch(state, direction, seen);
             return Some(CrossingEvent::Retouched { gap });
         }
-        if !seen.clear {
+        if !is_clear(state, seen) {
             state.ticks = 0;
             return None;
         }

@@ -4,7 +4,6 @@ use super::close::{Measured, slip_of};
 use super::crossing::{Contact, CrossingEvent, Lift, WatchInput};
 use super::landing::OnEdge;
 use super::odometry::Rolling;
-use super::restore::UNSURE_WITHIN;
 use super::tread::Rolls;
 use super::{EstimateState, Estimator, Expectation, Findings, LiftPoint, OpenCrossing, Position};
 use crate::fault::{Fault, Limit};
@@ -342,13 +341,12 @@ impl Estimator {
     /// Input of the crossing watch.
     pub(super) fn watch_input(&self, state: &EstimateState, sensed: &SensedState) -> WatchInput {
         let to_window = self.steps.to_window(state.direction, self.distance(state));
-        // The wall that a search begins on is as high as its steps, whatever the table has.
-        let doubtful = state.known.is_searching() && state.watch.contact == Contact::Leaving;
         WatchInput {
             radius: sensed.radius.value,
             compression: sensed.compression_filtered,
             travel: sensed.travel,
-            near: to_window.is_some_and(|ahead| ahead <= Q16::ZERO) && !doubtful,
+            // A search does not know where its step is.
+            near: to_window.is_some_and(|ahead| ahead <= Q16::ZERO) && !state.known.is_searching(),
             over: self.is_over(state),
             clear: self.clear_of(state, sensed),
         }
@@ -364,13 +362,18 @@ impl Estimator {
             })
     }
 
-    /// Whether the wheel has left the corner of the last step behind.
-    fn clear_of(&self, state: &EstimateState, sensed: &SensedState) -> bool {
+    /// Whether the wheel has left the corner of the last step behind; none where a doubtful position
+    /// cannot tell.
+    fn clear_of(&self, state: &EstimateState, sensed: &SensedState) -> Option<bool> {
+        let doubtful = state.known.is_unsure() || state.known.is_searching();
+        if doubtful && state.crossing.as_ref().is_none_or(|open| open.resumed) {
+            return None;
+        }
         let landed = |open: &OpenCrossing| open.landing.map(|landing| landing.face);
         let lifted =
             |open: &OpenCrossing| open.lift.map(|point| landed(open).unwrap_or(point.face));
         let followed = state.crossing.as_ref().and_then(lifted);
-        let Some(face) = followed.or(state.leaving) else { return true };
+        let Some(face) = followed.or(state.leaving) else { return Some(true) };
         let nominal = self.corner().first_contact(state.direction.opposite());
         let (past, reach) = match state.direction {
             Direction::Deploy => (state.position - face, nominal),
@@ -381,10 +384,8 @@ impl Estimator {
             }
         };
         // The patch must be clear of the edge: on the upper wall behind the centre, on the
-        // lower wall ahead of it. By the table, a doubtful record has that face elsewhere.
-        let unsure = state.known.is_unsure() && followed.is_some();
-        let doubt = if unsure { UNSURE_WITHIN } else { Q16::ZERO };
-        past > reach + doubt
+        // lower wall ahead of it.
+        Some(past > reach)
     }
 
     /// On to the next step.

@@ -17,12 +17,9 @@ const ON_CORNER: Millimetres = q16(500_000);
 /// Error of a record, mm: coasting and the odometry's error.
 const SURE_WITHIN: Millimetres = q16(500_000);
 /// Error of a record after a drive ran unobserved, mm: half of what it may have gone.
-pub(super) const UNSURE_WITHIN: Millimetres = q16(2_000_000);
+const UNSURE_WITHIN: Millimetres = q16(2_000_000);
 /// Nearer to the edge than this, the wheel is on top of it, mm.
 const AT_EDGE: Millimetres = q16(300_000);
-/// From here to its edge a wheel on a corner is within [`ON_WALL`] of the next wall, mm:
-/// `sqrt(2 R h)` with R of 25 mm is 3.5 mm.
-const ON_TOP: Millimetres = q16(4_000_000);
 /// Travel from the first contact over which a corner carries so little that a retracting
 /// wheel leaves it at once, mm.
 const RUN_IN: Millimetres = q16(2_000_000);
@@ -147,19 +144,26 @@ impl Estimator {
 
     /// Starts on the wall of the present level. A retracting wheel that may still touch the
     /// corner behind it has the wall measured when it is clear: the corner adds compression,
-    /// which would be taken for the wall's height. In doubt the wheel may be on a corner's
-    /// end, which the arm cannot tell from the wall.
+    /// which would be taken for the wall's height. So has a wheel that is up, but not yet past the
+    /// face. In doubt it may be on a corner's end, which the arm cannot tell from the wall.
     pub(super) fn begin_on_wall(&self, state: &mut EstimateState, sensed: &SensedState) {
         if state.known.is_unsure() {
-            return self.begin_off(state, ON_TOP);
+            return self.begin_off(state);
         }
+        let tolerance = self.steps.tolerance();
+        let behind = |step| self.steps.face(step).map(|face| face - state.position);
         let left = match state.direction {
-            Direction::Deploy => None,
-            Direction::Retract => self.steps.face(state.next_step.saturating_add(1)),
+            Direction::Deploy => {
+                let up = state.next_step.checked_sub(1).unwrap_or(self.steps.count());
+                behind(up).map(|ahead| ahead + tolerance).filter(|ahead| *ahead > Q16::ZERO)
+            }
+            Direction::Retract => behind(state.next_step.saturating_add(1))
+                .filter(|ahead| *ahead < self.steps.touches_within())
+                .map(|ahead| ahead - tolerance),
         };
-        match left.filter(|face| *face - state.position < self.steps.touches_within()) {
-            Some(face) => {
-                state.leaving = Some(face - self.steps.tolerance());
+        match left {
+            Some(ahead) => {
+                state.leaving = Some(state.position + ahead);
                 self.watch.begin_on_corner(&mut state.watch, state.direction, state.level);
             }
             None => {
@@ -169,13 +173,9 @@ impl Estimator {
         }
     }
 
-    /// Starts towards the wall of the present level, off a corner whose face may be `ahead` mm
-    /// ahead.
-    pub(super) fn begin_off(&self, state: &mut EstimateState, ahead: Millimetres) {
-        state.leaving = Some(match state.direction {
-            Direction::Deploy => state.position + ahead,
-            Direction::Retract => state.position,
-        });
+    /// Starts towards the wall of the present level, perhaps off a corner.
+    pub(super) fn begin_off(&self, state: &mut EstimateState) {
+        state.leaving = None;
         self.watch.begin_on_corner(&mut state.watch, state.direction, state.level);
     }
 

@@ -259,12 +259,26 @@ fn on_a_wall_the_step_ahead_is_the_next_one_and_without_one_nothing_is_searched(
 }
 
 #[test]
+fn up_but_before_the_face_the_wall_is_measured_behind_it() {
+    let tolerance = estimator().steps.tolerance();
+    for (next_step, face) in [(2, 18), (3, 40), (0, 62)] {
+        for (ahead, leaves) in [(Q16::DELTA, true), (Q16::ZERO, false)] {
+            let position = Q16::from_num(face) + tolerance - ahead;
+            let start = state(Position::Located, 0.0, Direction::Deploy);
+            let mut state = EstimateState { next_step, position, ..start };
+            estimator().begin_on_wall(&mut state, &sensed(1, 0.0, 0.3));
+            assert_eq!(state.watch.contact == Contact::Leaving, leaves, "{face} {ahead}");
+        }
+    }
+}
+
+#[test]
 fn in_doubt_no_wall_is_measured_before_a_corner_is_surely_behind() {
     for direction in Direction::ALL {
         for known in [Position::Located, DOUBTFUL] {
             let mut state = EstimateState { next_step: 1, ..state(known, 22.0, direction) };
             estimator().begin_on_wall(&mut state, &sensed(1, 0.0, 0.3));
-            let leaves = state.watch.contact == Contact::Leaving && state.leaving.is_some();
+            let leaves = state.watch.contact == Contact::Leaving;
             assert_eq!(leaves, known.is_unsure(), "{direction:?}");
         }
     }

@@ -77,8 +77,7 @@ impl Estimator {
         state.level = level;
         let level = level.min(self.steps.count());
         state.next_step = self.steps.ahead_of_level(level, state.direction);
-        // As if the wheel had just come onto a corner: after its reach it is surely clear.
-        self.begin_off(state, self.steps.corner_reach());
+        self.begin_off(state);
     }
 
     /// Turning back, perhaps on a corner.
@@ -244,12 +243,7 @@ mod tests {
             for (direction, expected) in [(Direction::Deploy, out), (Direction::Retract, back)] {
                 let mut state = state(direction, 30.0, 0);
                 estimator().start_searching(&mut state, &seen);
-                let clear = match direction {
-                    Direction::Deploy => state.position + estimator().steps.corner_reach(),
-                    Direction::Retract => state.position,
-                };
                 assert_eq!((state.level, state.next_step), expected, "{up} {direction:?}");
-                assert_eq!(state.leaving, Some(clear), "{up} {direction:?}");
                 assert_eq!(state.watch.contact, Contact::Leaving);
             }
         }

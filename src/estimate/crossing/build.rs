@@ -54,7 +54,7 @@ mod tests {
             travel: Travel::ZERO,
             near: false,
             over: false,
-            clear: true,
+            clear: Some(true),
         }
     }
 
@@ -100,7 +100,7 @@ mod tests {
             // The next step is far.
             let near = x.abs() < 16.0 && state.contact != Contact::Leaving;
             let over = direction == Direction::Retract && x < -14.0;
-            let now = WatchInput { near, over, clear, ..seen(150.0 - y, compression) };
+            let now = WatchInput { near, over, clear: Some(clear), ..seen(150.0 - y, compression) };
             if index == 0 {
                 let level = u8::from(direction == Direction::Retract);
                 match from {
@@ -330,6 +330,31 @@ mod tests {
     }
 
     #[test]
+    fn in_doubt_a_wall_is_where_the_ground_is_flat() {
+        let watch = watch();
+        let mut state = WatchState::default();
+        watch.begin_on_corner(&mut state, Direction::Deploy, 1);
+        let wall = watch.wall(1).to_num::<f64>();
+        // From 4 mm before a face, over 3 mm of a wall, onto the corner behind it.
+        let (mut at, mut measured) = (-4.0f64, None);
+        while at < 6.0 {
+            at += 0.01;
+            let off = at.min(0.0).powi(2) / 50.0 - 0.08 * (at - 3.0).max(0.0);
+            let ground = ((wall + off) / 0.04).round() * 0.04;
+            let travel = Travel::from_num(at);
+            let now = WatchInput { travel, near: true, clear: None, ..seen(ground, 0.0) };
+            match watch.step(&mut state, Direction::Deploy, &now) {
+                Some(CrossingEvent::GapClosed { .. }) => measured = Some(at),
+                Some(CrossingEvent::Touched) => break,
+                _ => {}
+            }
+        }
+        let base = state.baseline.output().to_num::<f64>() - wall;
+        assert!(measured.is_some_and(|at| at < 3.0) && base.abs() < 0.06, "{measured:?} {base}");
+        assert!((4.5..5.5).contains(&at), "felt at {at}");
+    }
+
+    #[test]
     fn the_next_corner_is_felt_before_the_wall_between_was_measured() {
         let again = super::super::AGAIN;
         let signs = |direction: Direction, beyond: Q16| {
@@ -340,7 +365,8 @@ mod tests {
             // So far off the wall that this level has by the table, in the way of the run.
             let wall = watch.wall(level);
             let off = if direction == Direction::Deploy { -beyond } else { beyond };
-            let at = WatchInput { radius: wall + off, near: true, clear: false, ..seen(0.0, 0.0) };
+            let at =
+                WatchInput { radius: wall + off, near: true, clear: Some(false), ..seen(0.0, 0.0) };
             let sign = (1..50)
                 .find_map(|tick| watch.step(&mut state, direction, &at).map(|sign| (sign, tick)));
             (sign, watch.rise(&state, direction, &at), state.contact)

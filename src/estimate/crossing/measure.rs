@@ -1,10 +1,14 @@
-//! What a crossing measures: the compression of a wheel that falls, and the gap.
+//! What a crossing measures: flat ground, the compression of a wheel that falls, and the gap.
 
 #![deny(clippy::float_arithmetic)]
 
-use super::{CrossingWatch, HEIGHT_MOST, Lift, PER_FALL, WatchInput, WatchState};
+use super::{CrossingWatch, HEIGHT_MOST, HOLD, Lift, PER_FALL, WatchInput, WatchState};
 use crate::numeric::sqrt;
-use crate::units::{Millimetres, Q16, Ratio};
+use crate::units::{Millimetres, Q16, Ratio, Travel, q16};
+
+/// Travel over which ground within [`HOLD`] is a wall, mm. On a corner less than 2.1 mm before its face
+/// is as flat, by `d (2 x - d) / 2 R`, and then 0.09 mm below its wall, by `x^2 / 2 R`.
+const FLAT: Travel = q16(1_500_000).widen();
 
 impl CrossingWatch {
     /// Place in the kept depths of a wheel that has sunk by `fall`, and the part beyond it.
@@ -50,4 +54,14 @@ impl CrossingWatch {
             distance: sqrt((reach * reach - over * over).max(Q16::ZERO)),
         }
     }
+}
+
+/// Whether the wheel is on a wall: where its place does not tell, by ground that is flat.
+pub(super) fn is_clear(state: &mut WatchState, seen: &WatchInput) -> bool {
+    let ground = seen.radius - seen.compression;
+    if (ground - state.level).abs() > HOLD {
+        (state.sampled, state.level) = (seen.travel, ground);
+    }
+    let flat = seen.travel.saturating_sub(state.sampled).saturating_abs() >= FLAT;
+    seen.clear.unwrap_or(flat)
 }
