@@ -65,12 +65,8 @@ pub fn run(arguments: &[String], long: bool) -> Result<u8> {
     eprintln!("\n== Tests\n{times}");
     let mut tests = cargo(&["test", "--workspace"]);
     tests.args(arguments);
-    if long {
-        tests.env(LONG, "1");
-    } else {
-        // The property tests draw the same numbers each time.
-        tests.env("PROPTEST_RNG_SEED", "1");
-    }
+    // Without the long samples the property tests draw the same numbers each time.
+    tests.env(if long { LONG } else { "PROPTEST_RNG_SEED" }, "1");
     tools.apply(&mut tests);
     Ok(exit_code(started(&mut tests)?))
 }

@@ -12,8 +12,7 @@ use nalgebra::DMatrix;
 use super::IdentifyError;
 use super::coordinates::{CREEP, Coordinates, FRICTION};
 use super::forward::{Channels, Run, Trajectory, derivatives, quotient, simulate};
-use super::least_squares::Noise;
-use super::least_squares::{Model, consider, minimise, robust};
+use super::least_squares::{Model, Noise, consider, minimise, robust};
 
 /// Deviations that the first fit assumes: compression, mm, angle, mrad, effort, N; ten
 /// times those of the sensors, as the start may be far off.
@@ -129,7 +128,7 @@ impl Model for Weighted<'_> {
 pub fn agree(runs: &[Run], coordinates: &Coordinates, all: &Contact) -> Result<(), IdentifyError> {
     let shift = |(run, common): (&Run, &Channels)| {
         // A log that settles nothing alone contradicts nothing.
-        let own = fit(std::slice::from_ref(run), coordinates).ok()?;
+        let own = fit(std::slice::from_ref(run), coordinates, &[]).ok()?;
         let channel = |(own, (common, least)): (&Vec<f64>, (&Vec<f64>, f64))| -> f64 {
             let deviation = Noise::of(own).effective().max(least);
             own.iter().zip(common).map(|(own, common)| ((own - common) / deviation).powi(2)).sum()
@@ -147,8 +146,13 @@ pub fn agree(runs: &[Run], coordinates: &Coordinates, all: &Contact) -> Result<(
     }
 }
 
-/// Fits the coordinates to the runs, then twice more with the noise that this leaves.
-pub fn fit(runs: &[Run], coordinates: &Coordinates) -> Result<Contact, IdentifyError> {
+/// Fits the coordinates to the runs, then twice more with the noise that this leaves; the last time
+/// from these offsets of friction, too, which has small minima.
+pub fn fit(
+    runs: &[Run],
+    coordinates: &Coordinates,
+    offsets_ln: &[f64],
+) -> Result<Contact, IdentifyError> {
     let start: Vec<f64> = coordinates.priors().iter().map(|prior| prior.mean).collect();
     // The creep law is held: fitted, it would absorb the model's errors at every climb.
     let creep = coordinates.priors()[CREEP];
@@ -160,7 +164,14 @@ pub fn fit(runs: &[Run], coordinates: &Coordinates) -> Result<Contact, IdentifyE
     model.reweigh(&first.x, &first.at);
     let second = minimise(&model, &first.x)?;
     model.reweigh(&second.x, &second.at);
-    let fitted = minimise(&model, &second.x)?;
+    let mut fitted = minimise(&model, &second.x)?;
+    for off in offsets_ln {
+        let mut from = second.x.clone();
+        from[FRICTION] += off;
+        let other = minimise(&model, &from).ok();
+        let left = fitted.residuals.norm();
+        fitted = other.filter(|other| other.residuals.norm() < left).unwrap_or(fitted);
+    }
     let blocks = model.blocks();
     let data = blocks.last().map_or(0, |block| block.end);
     let mut covariance = robust(&fitted.jacobian, &fitted.residuals, &blocks, WIDENED)?;

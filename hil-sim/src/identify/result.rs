@@ -132,15 +132,16 @@ pub(super) struct Fit {
 
 /// Identifies the rig of `scenario` from its logs.
 pub fn identify(records: &[Record], scenario: &Scenario) -> Result<Identification, IdentifyError> {
-    let (found, Fit { coordinates, runs, contact }) = fitted(records, scenario)?;
+    let (found, Fit { coordinates, runs, contact }) = fitted(records, scenario, &[])?;
     contact::agree(&runs, &coordinates, &contact)?;
     Ok(found)
 }
 
-/// The same with the fit.
+/// The same with the fit, from these offsets of friction, too.
 pub(super) fn fitted(
     records: &[Record],
     scenario: &Scenario,
+    offsets_ln: &[f64],
 ) -> Result<(Identification, Fit), IdentifyError> {
     for record in records {
         let (its, ours) = (&record.scenario.rig, &scenario.rig);
@@ -153,7 +154,7 @@ pub(super) fn fitted(
     let mut coordinates = Coordinates::of(scenario);
     let run = |record| Run::of(record, &mut coordinates);
     let runs: Vec<Run> = records.iter().map(run).collect::<Result<_, _>>()?;
-    let contact = contact::fit(&runs, &coordinates)?;
+    let contact = contact::fit(&runs, &coordinates, offsets_ln)?;
     let actuator = actuator::fit(records, &runs, &contact.trajectories, contact.x[RADIUS])?;
     let lost = actuator.x[actuator::LOST];
     let report =
