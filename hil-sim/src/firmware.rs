@@ -159,9 +159,11 @@ pub fn build_binary(
         Profile::Release => &["--release"][..],
         Profile::Loop => &["--profile", "hil", "--no-default-features", "--features", "hil"],
     });
-    // Flags from the environment would displace the linker arguments of
-    // `.cargo/config.toml`.
-    cargo.env_remove("RUSTFLAGS").env_remove("CARGO_ENCODED_RUSTFLAGS");
+    // Flags from the environment would displace the linker arguments of `.cargo/config.toml`, and
+    // an incremental build is another image.
+    for name in ["RUSTFLAGS", "CARGO_ENCODED_RUSTFLAGS", "CARGO_INCREMENTAL"] {
+        cargo.env_remove(name);
+    }
     executable(&mut cargo, "the firmware", binary)
 }
 

@@ -64,9 +64,8 @@ pub fn run(arguments: &[String], long: bool) -> Result<u8> {
     })?;
     eprintln!("\n== Tests\n{times}");
     let mut tests = cargo(&["test", "--workspace"]);
-    tests.args(arguments);
     // Without the long samples the property tests draw the same numbers each time.
-    tests.env(if long { LONG } else { "PROPTEST_RNG_SEED" }, "1");
+    tests.args(arguments).env(if long { LONG } else { "PROPTEST_RNG_SEED" }, "1");
     tools.apply(&mut tests);
     Ok(exit_code(started(&mut tests)?))
 }

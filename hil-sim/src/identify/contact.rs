@@ -168,8 +168,7 @@ pub fn fit(
     for off in offsets_ln {
         let mut from = second.x.clone();
         from[FRICTION] += off;
-        let other = minimise(&model, &from).ok();
-        let left = fitted.residuals.norm();
+        let (left, other) = (fitted.residuals.norm(), minimise(&model, &from).ok());
         fitted = other.filter(|other| other.residuals.norm() < left).unwrap_or(fitted);
     }
     let blocks = model.blocks();
