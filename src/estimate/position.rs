@@ -83,8 +83,7 @@ impl Position {
 
     /// No step lies ahead that could set the position.
     pub fn stop_searching(&mut self) {
-        *self =
-            if self.is_unsure() { Self::Unconfirmed { searching: false } } else { Self::Located };
+        *self = Self::Unconfirmed { searching: false };
     }
 }
 
@@ -106,8 +105,5 @@ mod tests {
         let mut position = Position::Unconfirmed { searching: true };
         position.stop_searching();
         assert_eq!(position, Position::Unconfirmed { searching: false });
-        let mut position = Position::Searching;
-        position.stop_searching();
-        assert_eq!(position, Position::Located);
     }
 }

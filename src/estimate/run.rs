@@ -147,7 +147,7 @@ impl Estimator {
             sensed.level == expected || off <= self.steps.height().half() + state.raised.abs();
         if !on_wall || !level || state.known.is_searching() {
             Err(Fault::LevelMismatch)
-        } else if self.sigma(state) > PLACE_WITHIN {
+        } else if state.known.is_unsure() || self.sigma(state) > PLACE_WITHIN {
             Err(Fault::PlaceUnconfirmed)
         } else {
             Ok(())
@@ -160,7 +160,7 @@ impl Estimator {
     }
 
     /// One sigma of the position, mm: that of the odometry, with the slip that was measured. A
-    /// displaced step and an old record have limits of their own.
+    /// displaced step has a limit of its own.
     pub fn sigma(&self, state: &EstimateState) -> Millimetres {
         state.odometry.sigma(state.position)
     }
@@ -300,5 +300,10 @@ mod tests {
                 assert_eq!(confirmed.is_ok(), shown == level, "{missed} {extra} {shown}");
             }
         }
+        // A record that may be off is none of the end of travel.
+        let known = Position::Unconfirmed { searching: false };
+        let state = EstimateState { known, ..state(back, 0.0, 0) };
+        let confirmed = estimator().confirms_end(&state, &sensed(0, 0.0, 0.3));
+        assert_eq!(confirmed, Err(Fault::PlaceUnconfirmed));
     }
 }

@@ -225,13 +225,18 @@ impl Judge {
     }
 
     /// Whether a run after a reset reports something untrue. Only a run without a confirmed
-    /// record may report that its position is unknown.
+    /// record may report that its position is unknown, or at its end that no step lay ahead.
     fn false_alarm(&self, kind: Kind) -> bool {
-        let untrue =
-            [Limit::StepExtra, Limit::StepMissing, Limit::CompressionStrange].map(Limit::code);
-        let lost = kind != Kind::Recorded;
-        self.fault.is_some_and(|(_, code)| !(lost && code == Fault::PositionUnknown.code()))
-            || self.limits.iter().any(|(_, code)| untrue.contains(code))
+        let limited = |limit: Limit| self.limits.iter().any(|(_, code)| *code == limit.code());
+        let (lost, unconfirmed) = (kind != Kind::Recorded, limited(Limit::PositionUnconfirmed));
+        let honest = |code| {
+            let is = |fault: Fault| code == fault.code();
+            lost && (is(Fault::PositionUnknown) || unconfirmed && is(Fault::PlaceUnconfirmed))
+        };
+        self.fault.is_some_and(|(_, code)| !honest(code))
+            || [Limit::StepExtra, Limit::StepMissing, Limit::CompressionStrange]
+                .map(limited)
+                .contains(&true)
     }
 
     fn names(&self, code: u16) -> bool {

@@ -204,10 +204,11 @@ fn next_run(board: &mut Board<'_>, scenario: &Scenario) -> Result<Option<String>
             let far = (at_mm - end_mm).abs() > ARRIVED_MM;
             return Ok(far.then(|| format!("says it arrived at {at_mm:.2} mm")));
         }
-        if board.mode != Mode::FaultHold(Fault::PositionUnknown) {
+        let lost = [Fault::PositionUnknown, Fault::PlaceUnconfirmed].map(Mode::FaultHold);
+        if !lost.contains(&board.mode) {
             break;
         }
-        // As the fault's text advises: the other direction.
+        // As the faults' texts advise: the other direction.
         direction = direction.opposite();
         for _ in 0..HOLD_MS {
             board.step(None)?;
