@@ -67,6 +67,11 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     if args.published {
         return by_published(args, &given);
     }
+    if let Some(out) = &args.out {
+        let read: Vec<&Path> =
+            args.logs.iter().chain(&args.scenario).map(PathBuf::as_path).collect();
+        output::spare("--out", &out.join(FILE), &read)?;
+    }
     let unnamed = args.rig.is_none() && args.scenario.is_none() && args.set.is_empty();
     let named = (!unnamed).then_some(&given);
     let records: Vec<Record> =

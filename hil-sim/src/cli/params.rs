@@ -109,10 +109,15 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
 
 /// Carries out the action on the parameters of this place.
 pub fn act(args: &Args, store: &mut impl Store) -> Result<Outcome, Failure> {
+    let file = match &args.action {
+        Action::Restore { from } | Action::Diff { from } => from.as_ref(),
+        _ => None,
+    };
+    let given = file.map(|path| Scenario::resolve(None, Some(path), &[])).transpose()?;
     let held = match store.held() {
-        // A set that is unreadable or damaged can still be replaced.
+        // A board's set that is unreadable or damaged can still be replaced.
         Err(StoreError::Set { .. } | StoreError::Refused(_))
-            if matches!(args.action, Action::Restore { .. }) =>
+            if args.file.is_none() && matches!(args.action, Action::Restore { .. }) =>
         {
             store.restore()?;
             store.held()?
@@ -140,22 +145,20 @@ pub fn act(args: &Args, store: &mut impl Store) -> Result<Outcome, Failure> {
             write_text(to, &scenario.to_toml())?;
             show(args, &held, false, &[], None)
         }
-        Action::Restore { from: Some(path) } => {
-            let new = Scenario::resolve(None, Some(path), &[])?;
-            super::scenario::remind(&path.display().to_string(), &new);
-            replace(args, store, &scenario, &new, &stem(path))
-        }
-        Action::Restore { from: None } => {
-            store.restore()?;
-            let now = store.held()?;
-            show_changes(args, &now, true, &scenario, &scenario_of(&now))
-        }
+        Action::Restore { .. } => match file.zip(given) {
+            Some((path, new)) => {
+                super::scenario::remind(&path.display().to_string(), &new);
+                replace(args, store, &scenario, &new, &stem(path))
+            }
+            None => {
+                store.restore()?;
+                let now = store.held()?;
+                show_changes(args, &now, true, &scenario, &scenario_of(&now))
+            }
+        },
         Action::Migrate => replace(args, store, &scenario, &scenario, &held.name),
-        Action::Diff { from } => {
-            let other = match from {
-                Some(path) => Scenario::resolve(None, Some(path), &[])?,
-                None => Scenario::named(&scenario.preset)?,
-            };
+        Action::Diff { .. } => {
+            let other = given.map_or_else(|| Scenario::named(&scenario.preset), Ok)?;
             show_changes(args, &held, false, &other, &scenario)
         }
     }
