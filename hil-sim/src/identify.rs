@@ -2,6 +2,7 @@
 
 pub mod accept;
 pub mod actuator;
+mod agree;
 pub mod contact;
 pub mod coordinates;
 pub mod forward;

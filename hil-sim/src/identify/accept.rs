@@ -3,12 +3,12 @@
 use serde::Serialize;
 use toml::Table;
 
+use super::IdentifyError;
 use super::coordinates::{FRICTION, LOAD, STIFFENING, STIFFNESS, TAU};
 use super::forward::{CHANNELS, quotient};
 use super::least_squares::Noise;
 use super::record::Record;
 use super::result::{Fit, Identification, Parameter, fitted, place_of};
-use super::{IdentifyError, contact};
 use crate::record::Summary;
 use crate::scenario::Scenario;
 use crate::table::number;
@@ -144,8 +144,7 @@ fn judged(
             format!("{}: slipped by {slip:.2} mm at step {}", record.name, line.index)
         }));
     }
-    let same = contact::agree(&fit.runs, &fit.coordinates, &fit.contact);
-    reasons.extend(same.err().map(|error| error.to_string()));
+    reasons.extend(fit.agree(records).err().map(|error| error.to_string()));
     let off = fit.starts_off(&first.scenario);
     let residuals = residuals(&found, &fit, off)?;
     let keys = keys(&found, &first.scenario, off);

@@ -18,7 +18,7 @@ use super::least_squares::{Model, Noise, consider, minimise, robust};
 /// times those of the sensors, as the start may be far off.
 const FIRST: [f64; 3] = [5e-3, 0.3, 0.5];
 /// Least deviations: the forward model's own errors.
-const LEAST: [f64; 3] = [2e-4, 2e-2, 2e-2];
+pub(super) const LEAST: [f64; 3] = [2e-4, 2e-2, 2e-2];
 /// Length of a block of correlated values, by channel: 0.16 s, the shortest crossing.
 const BLOCKS: [usize; 3] = [16, 16, 4];
 /// By how much the scatter of the blocks is widened. Some nine crossings determine steps,
@@ -27,10 +27,6 @@ const BLOCKS: [usize; 3] = [16, 16, 4];
 /// drive's load between two counts, which raises the creep: 1.9, by the hidden rigs of
 /// seeds 1 to 10.
 const WIDENED: f64 = 1.18 * 1.9;
-/// Largest shift of logs of one rig, see [`agree`]: mostly 3 on rigs as identified, but up to 30
-/// where a fit ends in one of its small minima (2 of 120 rigs); 55 and more between rigs whose
-/// friction differs by a quarter.
-const AGREE: f64 = 40.0;
 /// Deviation of friction while nothing determines it, logarithm.
 const HELD_LN: f64 = 0.02;
 /// Deviation of the held creep law, logarithm.
@@ -119,30 +115,6 @@ impl Model for Weighted<'_> {
             column.extend(priors.map(|(i, p)| if i == index { 1.0 / p.deviation } else { 0.0 }));
         }
         Some(columns)
-    }
-}
-
-/// Refuses logs of several rigs. The square of the shift from what a log's own fit leaves to what
-/// the common fit leaves, in deviations of the own one, is about the number of coordinates where
-/// noise alone differs. The log that is shifted most is named.
-pub fn agree(runs: &[Run], coordinates: &Coordinates, all: &Contact) -> Result<(), IdentifyError> {
-    let shift = |(run, common): (&Run, &Channels)| {
-        // A log that settles nothing alone contradicts nothing.
-        let own = fit(std::slice::from_ref(run), coordinates, &[]).ok()?;
-        let channel = |(own, (common, least)): (&Vec<f64>, (&Vec<f64>, f64))| -> f64 {
-            let deviation = Noise::of(own).effective().max(least);
-            own.iter().zip(common).map(|(own, common)| ((own - common) / deviation).powi(2)).sum()
-        };
-        let square: f64 = own.residuals[0].iter().zip(common.iter().zip(LEAST)).map(channel).sum();
-        Some((run.name.clone(), square / own.x.len() as f64))
-    };
-    if runs.len() < 2 {
-        return Ok(());
-    }
-    let shifts = runs.iter().zip(&all.residuals).filter_map(shift);
-    match shifts.max_by(|a, b| a.1.total_cmp(&b.1)) {
-        Some((name, shift)) if shift > AGREE => Err(IdentifyError::Several(name, shift.sqrt())),
-        _ => Ok(()),
     }
 }
 

@@ -128,12 +128,13 @@ pub(super) struct Fit {
     pub(super) coordinates: Coordinates,
     pub(super) runs: Vec<Run>,
     pub(super) contact: Contact,
+    pub(super) actuator: Actuator,
 }
 
 /// Identifies the rig of `scenario` from its logs.
 pub fn identify(records: &[Record], scenario: &Scenario) -> Result<Identification, IdentifyError> {
-    let (found, Fit { coordinates, runs, contact }) = fitted(records, scenario, &[])?;
-    contact::agree(&runs, &coordinates, &contact)?;
+    let (found, fit) = fitted(records, scenario, &[])?;
+    fit.agree(records)?;
     Ok(found)
 }
 
@@ -178,7 +179,7 @@ pub(super) fn fitted(
         is_complete,
         parameters,
     };
-    Ok((found, Fit { coordinates, runs, contact }))
+    Ok((found, Fit { coordinates, runs, contact, actuator }))
 }
 
 struct Document<'a> {

@@ -125,7 +125,11 @@ fn logs_of_two_rigs_are_refused_and_the_odd_one_is_named() {
     // The same sleeve, less friction.
     let smooth = log("smooth", &["--set", "plant.mu=0.85"]);
     let nominal = log("nominal", &[]);
-    refused_in(at, &["identify", &nominal, &smooth], &["not of the rig of the other logs"]);
+    // The same contact, another pre-tightener.
+    let quick = log("quick", &["--set", "preload.slew_n_per_s=28"]);
+    for other in [smooth, quick] {
+        refused_in(at, &["identify", &nominal, &other], &["not of the rig of the other logs"]);
+    }
     let output = rig_in(at, &["identify", &one, &of_one]);
     assert_eq!(code(&output), 0, "{}", stderr(&output));
     // A log is accepted; a reading of the first one, or rubber that it was not told of, is not.
