@@ -48,6 +48,8 @@ pub struct Odometry {
     share: Ratio,
     gain: Ratio,
     from: Option<Start>,
+    /// A slip has been taken off it since its origin.
+    slipped: bool,
 }
 
 impl Default for Odometry {
@@ -61,6 +63,7 @@ impl Default for Odometry {
             share: Ratio::ZERO,
             gain: Ratio::ZERO,
             from: None,
+            slipped: false,
         }
     }
 }
@@ -120,6 +123,11 @@ impl Odometry {
         };
     }
 
+    /// A slip has been taken off the position since its origin: more of it may hide.
+    pub const fn has_slipped(&self) -> bool {
+        self.slipped
+    }
+
     /// One sigma of `position`, mm.
     pub fn sigma(&self, position: Millimetres) -> Millimetres {
         let reach = (position - self.origin) * PER_REACH;
@@ -132,6 +140,7 @@ impl Odometry {
     /// take `sigma`, mm.
     pub fn slip(&mut self, lost: Millimetres, sigma: Millimetres) {
         self.offset = self.offset.saturating_sub(lost.widen());
+        self.slipped |= lost > Q16::ZERO;
         let parts = sigma * PER_PLACE;
         self.variance[0] += parts * parts;
     }

@@ -140,6 +140,8 @@ impl Estimator {
             Direction::Deploy => (self.steps.count() + state.extra).saturating_sub(state.missed),
             Direction::Retract => 0,
         };
+        // Displaced, or is it the wheel: by a slip that was larger than it seemed?
+        let lost = state.displaced.is_some() && state.odometry.has_slipped();
         let on_wall = matches!(state.watch.contact, Contact::Wall | Contact::Leaving);
         // Steps that are not as high as the table has them add up.
         let off = (sensed.steps_up - Q16::from_num(expected)).abs() * self.steps.height();
@@ -147,7 +149,7 @@ impl Estimator {
             sensed.level == expected || off <= self.steps.height().half() + state.raised.abs();
         if !on_wall || !level || state.known.is_searching() {
             Err(Fault::LevelMismatch)
-        } else if state.known.is_unsure() || self.sigma(state) > PLACE_WITHIN {
+        } else if state.known.is_unsure() || lost || self.sigma(state) > PLACE_WITHIN {
             Err(Fault::PlaceUnconfirmed)
         } else {
             Ok(())
@@ -300,7 +302,16 @@ mod tests {
                 assert_eq!(confirmed.is_ok(), shown == level, "{missed} {extra} {shown}");
             }
         }
-        // A record that may be off is none of the end of travel.
+        // Nor is it confirmed where the last step and the slip before it disagree,
+        for (displaced, slipped) in [(None, 0.2), (Some((1, q16(3_400_000))), 0.0)] {
+            let mut state = EstimateState { displaced, ..state(back, 0.0, 0) };
+            state.odometry.slip(Q16::from_num(slipped), Q16::ZERO);
+            assert_eq!(estimator().confirms_end(&state, &sensed(0, 0.0, 0.3)), Ok(()));
+            state.odometry.slip(q16(200_000), Q16::ZERO);
+            let confirmed = estimator().confirms_end(&state, &sensed(0, 0.0, 0.3));
+            assert_eq!(confirmed.is_ok(), displaced.is_none());
+        }
+        // or by a record that may be off.
         let known = Position::Unconfirmed { searching: false };
         let state = EstimateState { known, ..state(back, 0.0, 0) };
         let confirmed = estimator().confirms_end(&state, &sensed(0, 0.0, 0.3));
