@@ -8,7 +8,7 @@ use super::failure::{Failure, Outcome};
 use super::scenario::seed;
 use crate::campaign::{Column, Frame, column};
 use crate::stress::{self, StressReport, Worst};
-use crate::table::{counted, is_narrow, width, wrapped};
+use crate::table::{counted, width, wrapped};
 
 /// The plant at the ends of every range.
 ///
@@ -70,7 +70,7 @@ const COLUMNS: [Column; 9] = [
 ];
 
 fn human(report: &StressReport, rows: &Frame) -> String {
-    let rows = rows.fitted(&["tau_s"], is_narrow()).text();
+    let rows = rows.text(&["tau_s", "stiffening"]);
     let mut text = format!("{} of the plant\n{rows}", counted(report.cases, "case"));
     for (name, refused) in &report.refused {
         let refused = format!("refused {}: {name}, as: {}", refused.count, refused.example);
