@@ -110,10 +110,4 @@ mod tests {
         let shown = [-0.04, 0.04, -0.06, 0.06].map(|value| signed(value, 1));
         assert_eq!(shown, ["0.0", "0.0", "-0.1", "+0.1"]);
     }
-
-    #[test]
-    fn one_is_singular() {
-        let shown = [0, 1, 2, -1].map(|n| counted(n, "slip event"));
-        assert_eq!(shown, ["0 slip events", "1 slip event", "2 slip events", "-1 slip event"]);
-    }
 }

@@ -68,7 +68,7 @@ impl Frame {
             count += 1;
         }
         let (table, keys) = (table(&spare[..count]), spare[..count].join(", "));
-        let note = format!("only --table has the columns {keys}");
+        let note = format!("left out, but in --table: {keys}");
         format!("{table}\n")
             + &if count == 0 { String::new() } else { wrapped(&note, "  ", width()) }
     }

@@ -172,11 +172,4 @@ mod tests {
         assert_eq!(marks([-0.1, 27.8, f64::NAN].into_iter(), 2.0), [0.0, 10.0, 20.0, 30.0]);
         assert_eq!(marks([2.65].into_iter(), 1.5), [1.5, 2.0, 2.5, 3.0, 3.5]);
     }
-
-    #[test]
-    fn the_first_plots_have_their_legend_in_half_a_small_terminal() {
-        for plot in &PLOTS[..4] {
-            assert!(plot.title().width() <= 38, "{}", plot.title());
-        }
-    }
 }
