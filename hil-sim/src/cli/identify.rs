@@ -126,7 +126,7 @@ fn human(found: &Identification) -> String {
     let mut text = format!("{} degrees of freedom\n{table}\n\n", found.degrees_of_freedom);
     let rows = found.residuals.iter().map(|left| {
         vec![
-            format!("{}, {}", left.log, left.channel),
+            format!("{}:\n  {}", left.log, left.channel),
             left.unit.to_owned(),
             figures(left.rms, left.rms),
             left.count.to_string(),
