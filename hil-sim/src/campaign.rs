@@ -5,7 +5,7 @@ mod shard;
 
 use rayon::prelude::*;
 
-pub use frame::{Column, Frame, column};
+pub use frame::{AS_GIVEN, Column, Frame, column};
 pub use shard::{Shard, ShardError};
 
 /// What watches a campaign.

@@ -161,7 +161,7 @@ fn helped_elsewhere(arguments: &[OsString]) -> Option<&'static str> {
 
 /// Prints why a verb could not do its work.
 fn failed(failure: &Failure) -> ExitCode {
-    eprintln!("error: {failure}");
+    output::complain(&format!("error: {failure}"));
     failure.code()
 }
 

@@ -16,6 +16,7 @@ use crate::scenario::{ControllerKind, Scenario};
 use crate::session::RunError;
 
 use tuning::MOST_TRIES;
+pub use tuning::TUNED_WITHIN;
 
 /// The strategies, the one that the others are compared with first.
 pub const STRATEGIES: [ControllerKind; 4] = [

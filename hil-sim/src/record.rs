@@ -37,4 +37,5 @@ pub use tick::{
 };
 pub use time_lost::TimeLost;
 pub use view::View;
+pub(crate) use view::shown;
 pub use write::{WriteError, Writer, write_all, write_csv};

@@ -1,7 +1,9 @@
 //! Tables and text of the terminal, at most [`width`] columns wide, and their numbers.
 
 use comfy_table::presets::UTF8_HORIZONTAL_ONLY;
-use comfy_table::{Cell, CellAlignment, ContentArrangement, Table, TableComponent};
+use comfy_table::{
+    Cell, CellAlignment, ColumnConstraint, ContentArrangement, Table, TableComponent, Width,
+};
 
 /// Most columns that the output takes.
 const WIDTH: u16 = 100;
@@ -13,24 +15,16 @@ pub fn width() -> u16 {
     Table::new().width().map_or(WIDTH, |columns| columns.clamp(NARROW, WIDTH))
 }
 
-/// Whether the terminal is too narrow for every column.
-pub fn is_narrow() -> bool {
-    width() < WIDTH
-}
-
 /// `text` broken at blanks to at most this many columns, each line after `indent`.
 pub fn wrapped(text: &str, indent: &str, columns: u16) -> String {
     let most = usize::from(columns) - indent.len();
-    let mut lines = vec![String::new()];
+    let mut lines: Vec<String> = Vec::new();
     for word in text.split_whitespace() {
-        let line = lines.last_mut().expect("there is always one");
-        if line.is_empty() {
-            line.push_str(word);
-        } else if line.chars().count() + 1 + word.chars().count() <= most {
-            line.push(' ');
-            line.push_str(word);
-        } else {
-            lines.push(word.to_owned());
+        match lines.last_mut() {
+            Some(line) if line.chars().count() + 1 + word.chars().count() <= most => {
+                *line += &format!(" {word}");
+            }
+            _ => lines.push(word.to_owned()),
         }
     }
     lines.iter().map(|line| format!("{indent}{line}\n")).collect()
@@ -44,8 +38,10 @@ pub fn counted(count: impl std::fmt::Display, noun: &str) -> String {
 }
 
 /// A table of `head` and `rows` in the style of the others, its first column on the
-/// left and the rest on the right.
-pub fn plain(head: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> Table {
+/// left and the rest on the right. No word is broken, nor a line of the first column: a table
+/// of too many columns is wider than the terminal.
+pub fn plain(head: &[impl AsRef<str>], rows: impl IntoIterator<Item = Vec<String>>) -> Table {
+    let (columns, head) = (head.len(), head.iter().enumerate());
     let mut table = Table::new();
     table
         .load_preset(UTF8_HORIZONTAL_ONLY)
@@ -55,9 +51,22 @@ pub fn plain(head: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> Tabl
         .remove_style(TableComponent::RightBorderIntersections)
         .set_content_arrangement(ContentArrangement::Dynamic)
         .set_width(width())
-        .set_header(head.iter().enumerate().map(|(column, text)| cell(column, (*text).to_owned())));
+        .set_header(head.map(|(column, text)| cell(column, text.as_ref().to_owned())));
     for row in rows {
         table.add_row(row.into_iter().enumerate().map(|(column, text)| cell(column, text)));
+    }
+    let word = |text: String| text.split_whitespace().map(|word| word.chars().count()).max();
+    let least = |column: usize| {
+        let cells = table.column_cells_with_header_iter(column).flatten();
+        cells.filter_map(|cell| word(cell.content())).max().unwrap_or(0) as u16
+    };
+    let words: Vec<u16> = (0..columns).map(least).collect();
+    for (column, word) in table.column_iter_mut().zip(words) {
+        column.set_constraint(match column.index {
+            0 => ColumnConstraint::ContentWidth,
+            // With a blank on both sides.
+            _ => ColumnConstraint::LowerBoundary(Width::Fixed(word + 2)),
+        });
     }
     table
 }
@@ -100,11 +109,5 @@ mod tests {
         assert_eq!(shown, ["0.00", "0.00", "-0.01", "0.00", "-"]);
         let shown = [-0.04, 0.04, -0.06, 0.06].map(|value| signed(value, 1));
         assert_eq!(shown, ["0.0", "0.0", "-0.1", "+0.1"]);
-    }
-
-    #[test]
-    fn one_is_singular() {
-        let shown = [0, 1, 2, -1].map(|n| counted(n, "slip event"));
-        assert_eq!(shown, ["0 slip events", "1 slip event", "2 slip events", "-1 slip event"]);
     }
 }

@@ -130,13 +130,13 @@ fn operate(verb: &operate::Verb) -> Result<Outcome, Failure> {
 }
 
 fn capture(args: &capture::Args) -> Result<Outcome, Failure> {
-    let scenario = args.source.scenario()?;
+    let scenario = args.source.run.resolve()?;
     let (elf, strings) = image(&scenario)?;
     capture::write(args, &mut emulated(&elf, &strings, &scenario, false)?, &scenario)
 }
 
 fn live(args: &live::Args) -> Result<Outcome, Failure> {
-    let scenario = args.source.scenario()?;
+    let scenario = args.source.run.resolve()?;
     let (elf, strings) = image(&scenario)?;
     let mut source = emulated(&elf, &strings, &scenario, !args.headless)?;
     live::watch(args, &mut source, &scenario)

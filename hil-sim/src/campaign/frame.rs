@@ -2,12 +2,13 @@
 
 use std::borrow::Cow;
 
+use comfy_table::Table;
 use serde::Serialize;
 use serde_json::{Map, Value};
 
 use crate::report::{page_of, svg::escape, table};
 use crate::scenario::brief;
-use crate::table::{number, plain};
+use crate::table::{number, plain, width, wrapped};
 
 /// A column: the figure of each row that has its key.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -17,9 +18,12 @@ pub struct Column {
     /// Its heading; the unit follows.
     pub name: Cow<'static, str>,
     pub unit: &'static str,
-    /// Decimals shown to a reader; CSV has all.
+    /// Decimals shown to a reader, or [`AS_GIVEN`]; CSV has all.
     pub decimals: usize,
 }
+
+/// As many decimals as the number has.
+pub const AS_GIVEN: usize = usize::MAX;
 
 /// A column of these.
 pub const fn column(
@@ -48,18 +52,25 @@ impl Frame {
         Self { columns: columns.to_vec(), rows: rows.into_iter().map(row).collect() }
     }
 
-    /// Without the columns of these keys if the terminal `is_narrow`.
-    pub fn fitted(&self, spare: &[&str], is_narrow: bool) -> Self {
-        let mut frame = self.clone();
-        frame.columns.retain(|column| !(is_narrow && spare.contains(&&*column.key)));
-        frame
-    }
-
-    /// As a table of the terminal.
-    pub fn text(&self) -> String {
-        let heads: Vec<String> = self.heads("\n").collect();
-        let heads: Vec<&str> = heads.iter().map(String::as_str).collect();
-        format!("{}\n", plain(&heads, self.shown()))
+    /// As a table of the terminal: where that is too narrow, without as many of these keys as it
+    /// takes, from the first on, which it names.
+    pub fn text(&self, spare: &[&str]) -> String {
+        let table = |without: &[&str]| {
+            let mut frame = self.clone();
+            frame.columns.retain(|column| !without.contains(&&*column.key));
+            let heads: Vec<String> = frame.heads("\n").collect();
+            plain(&heads, frame.shown())
+        };
+        let is_wide =
+            |table: &Table| table.lines().any(|line| line.chars().count() > usize::from(width()));
+        let mut count = 0;
+        while count < spare.len() && is_wide(&table(&spare[..count])) {
+            count += 1;
+        }
+        let (table, keys) = (table(&spare[..count]), spare[..count].join(", "));
+        let note = format!("left out, but in --table: {keys}");
+        format!("{table}\n")
+            + &if count == 0 { String::new() } else { wrapped(&note, "  ", width()) }
     }
 
     /// As comma-separated values.
@@ -101,9 +112,12 @@ impl Frame {
     /// The rows as a reader sees them.
     fn shown(&self) -> impl Iterator<Item = Vec<String>> {
         let cell = |row: &Map<String, Value>, column: &Column| match row.get(&*column.key) {
-            None | Some(Value::Null) => "-".to_owned(),
+            None => String::new(),
+            Some(Value::Null) => "-".to_owned(),
             Some(Value::Bool(yes)) => if *yes { "yes" } else { "no" }.to_owned(),
-            Some(Value::Number(value)) if value.is_f64() => number(value.as_f64(), column.decimals),
+            Some(Value::Number(value)) if value.is_f64() && column.decimals != AS_GIVEN => {
+                number(value.as_f64(), column.decimals)
+            }
             Some(Value::Array(list)) if list.is_empty() => "-".to_owned(),
             Some(other) => brief(other),
         };
@@ -124,13 +138,13 @@ mod tests {
             column("gap_mm", "gap", "mm", 2),
             column("ok", "ok", "", 0),
         ];
-        let rows =
-            [json!({ "name": "a, <b>", "gap_mm": 1.2345, "ok": true }), json!({ "name": 2 })];
+        let rows = [
+            json!({ "name": "a, <b>", "gap_mm": 1.2345, "ok": true }),
+            json!({ "name": 2, "ok": null }),
+        ];
         let frame = Frame::of(&columns, rows);
         assert_eq!(frame.csv(), "name,gap_mm,ok\n\"a, <b>\",1.2345,true\n2,,\n");
-        assert_eq!(frame.fitted(&["gap_mm"], true).csv(), "name,ok\n\"a, <b>\",true\n2,\n");
-        assert_eq!(frame.fitted(&["gap_mm"], false), frame);
-        let text = frame.text();
+        let text = frame.text(&["gap_mm"]);
         assert!(
             text.contains("a, <b>") && text.contains("1.23 ") && text.contains("yes"),
             "{text}"

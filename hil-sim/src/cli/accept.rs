@@ -71,7 +71,7 @@ fn human(of: &Acceptance) -> String {
         vec![name, unit, stated, interval, limit, mark(key.ok)]
     });
     let mut text = format!(
-        "{}\n",
+        "{}\n\n",
         plain(&["parameter", "unit", "stated", "in the logs", "limit", "ok"], keys)
     );
     let rows = of.residuals.iter().map(|row| {
@@ -79,7 +79,7 @@ fn human(of: &Acceptance) -> String {
         vec![row.quantity.to_owned(), row.unit.to_owned(), rms, row.limit.to_string(), mark(row.ok)]
     });
     text +=
-        &format!("{}\n", plain(&["against the virtual rig", "unit", "rms", "limit", "ok"], rows));
+        &format!("{}\n\n", plain(&["against the virtual rig", "unit", "rms", "limit", "ok"], rows));
     let gaps = of.gap.iter().map(|gap| {
         let by = gap.by.unwrap_or("-").to_owned();
         let (measured, other) = (number(gap.measured_mm, 3), number(gap.independent_mm, 3));

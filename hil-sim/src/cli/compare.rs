@@ -8,7 +8,7 @@ use super::scenario::RunArgs;
 use crate::campaign::{Column, Frame, column};
 use crate::compare::{self, Comparison, Entry, STRATEGIES};
 use crate::oracle::Effort;
-use crate::table::{counted, is_narrow, width, wrapped};
+use crate::table::{counted, number, width, wrapped};
 
 /// Compares four preload strategies on the same random rigs: scheduled, constant at cruise,
 /// constant at the limit, reactive; and the oracle, the best run that the plants allow.
@@ -53,9 +53,9 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
 const COLUMNS: [Column; 11] = [
     column("controller", "controller", "", 0),
     column("duration_s", "command", "s", 3),
-    column("duration_ratio", "ratio", "", 3),
+    column("duration_ratio", "command", "ratio", 3),
     column("moving_s", "moving", "s", 3),
-    column("moving_ratio", "ratio", "", 3),
+    column("moving_ratio", "moving", "ratio", 3),
     column("worst_gap_mm", "gap", "mm", 3),
     column("least_slip_margin", "margin", "", 3),
     column("slip_events", "slips", "", 0),
@@ -86,14 +86,17 @@ const ORACLE: &str = "oracle: the fastest run found for each plant, all of it kn
 
 fn human(comparison: &Comparison, rows: &Frame) -> String {
     let mut text = format!(
-        "{}, each strategy tuned to a worst gap of {:.3} mm\n{}",
+        "{}, each strategy tuned to a worst gap of {:.3} mm within {} %\n{}",
         counted(comparison.runs, "rig"),
         comparison.gap_ref_mm,
-        rows.fitted(&["moving_s", "moving_ratio"], is_narrow()).text()
+        100.0 * compare::TUNED_WITHIN,
+        rows.text(&["moving_ratio", "moving_s", "mean_preload_n"])
     );
     text += &wrapped(LEGEND, "", width());
     for entry in comparison.entries.iter().filter(|entry| !entry.tuned) {
-        text += &format!("{}: no reserve brings it to the reference gap\n", entry.controller);
+        let gap = number(entry.worst_gap_mm, 3);
+        let reserve = number(entry.gap_reserve.map(|reserve| 100.0 * reserve), 1);
+        text += &format!("{}: no nearer than {gap} mm, at {reserve} %\n", entry.controller);
     }
     if comparison.entries.iter().any(|entry| entry.controller == compare::ORACLE) {
         text += &wrapped(ORACLE, "", width());

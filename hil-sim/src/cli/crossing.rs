@@ -22,8 +22,7 @@ use crate::table::{number, plain};
 /// Elements of the ring and stride, mm: the gap is within 0.1 % of that at half the stride
 /// and twice the elements.
 const FINENESS: (usize, f64) = (5760, 0.005);
-/// The same where elements are coupled: the gap is within 0.1 % of that at half the stride and
-/// twice the elements.
+/// The same where elements are coupled.
 const FINENESS_COUPLED: (usize, f64) = (1440, 0.02);
 
 /// One isolated crossing, at constant speed and preload or along a course, without arm and controller.
@@ -91,9 +90,6 @@ pub(super) enum Method {
     Ring,
     /// The tread rolled out in fixed point, as the firmware plans with it.
     Fixed,
-    /// Refused: it is gone.
-    #[value(hide = true)]
-    Reduced,
 }
 
 /// Refuses a speed or preload out of range, by the names that they were given with.
@@ -123,9 +119,6 @@ pub(super) fn compute(
     match method {
         Method::Ring => ring(scenario, case, &at),
         Method::Fixed => fixed(&scenario.rig, case, &at),
-        Method::Reduced => Err(Failure::input(
-            "--method reduced: the reduced model is gone, expected ring or fixed",
-        )),
     }
 }
 
@@ -193,7 +186,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
 fn human(printed: &Printed<'_>, case: &CrossingSetup) -> String {
     let method = match printed.method {
         Method::Ring => "ring",
-        Method::Fixed | Method::Reduced => "tread rolled out in fixed point",
+        Method::Fixed => "tread rolled out in fixed point",
     };
     let figures = &printed.figures;
     let driven =

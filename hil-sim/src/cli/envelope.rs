@@ -14,7 +14,7 @@ use crate::compare::STRATEGIES;
 use crate::envelope::{self, Cell, Envelope, Grid};
 use crate::files::{make_directory, write_text};
 use crate::scenario::ControllerKind;
-use crate::table::{number, plain};
+use crate::table::{number, plain, width, wrapped};
 
 /// Over friction (0.6 to 1.3) and load on this wheel (0 to 30 N): which preload strategy
 /// completes without slip, and in which time.
@@ -104,6 +104,9 @@ fn machine(found: &Envelope) -> Printed<'_> {
     }
 }
 
+const HEADLINE: &str = "Part of the grid in which each strategy completes without slip, and its \
+    time over the scheduled strategy's where both do";
+
 fn human(found: &Envelope) -> String {
     let head = ["controller", "known", "unknown", "time known", "time unknown"];
     let rows = STRATEGIES.map(|kind| {
@@ -118,11 +121,7 @@ fn human(found: &Envelope) -> String {
             ratio(false),
         ]
     });
-    let mut text = format!(
-        "Part of the grid in which each strategy completes without slip, and its time over the\n\
-         scheduled strategy's where both do\n{}\n",
-        plain(&head, rows)
-    );
+    let mut text = wrapped(HEADLINE, "", width()) + &format!("{}\n", plain(&head, rows));
     for (known, title) in [(true, "known"), (false, "unknown")] {
         text += &format!(
             "Friction and load {title} to the controller:\n\
@@ -137,7 +136,6 @@ fn human(found: &Envelope) -> String {
 fn letters(found: &Envelope, known: bool) -> comfy_table::Table {
     let frictions = found.frictions.iter().map(|friction| number(*friction, 2));
     let head: Vec<String> = std::iter::once("load N".to_owned()).chain(frictions).collect();
-    let head: Vec<&str> = head.iter().map(String::as_str).collect();
     let rows = found.loads_n.iter().rev().map(|load_n| {
         let at = |friction: &f64| {
             let good = found.cells.iter().filter(|cell| {

@@ -111,12 +111,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_failure_is_one_line() {
-        let failure = Failure::input("first\n  second\n\nthird\n");
-        assert_eq!(failure.to_string(), "first second third");
-    }
-
-    #[test]
     fn a_rig_that_cannot_be_built_is_bad_input_and_a_plant_that_fails_is_not() {
         let rig = RigError::OutOfReach { radius_mm: 1.0, min_mm: 2.0, max_mm: 2.1 };
         assert!(matches!(Failure::from(RunError::Rig(rig)), Failure::Input(_)));

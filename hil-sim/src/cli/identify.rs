@@ -2,9 +2,6 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::builder::PossibleValuesParser;
-use comfy_table::ColumnConstraint;
-
 use super::failure::{Failure, Outcome};
 use super::output::{self, WithFiles};
 use crate::identify::IdentifyError;
@@ -15,6 +12,7 @@ use crate::identify::result::{Identification, Parameter, Residuals, figures, ide
 use crate::scenario::{PRESETS, Scenario};
 use crate::table::{number, plain, width, wrapped};
 use crate::{files, progress};
+use clap::builder::PossibleValuesParser;
 
 /// Identifies a rig's parameters from its logs, with 95 % intervals.
 ///
@@ -129,17 +127,13 @@ fn human(found: &Identification) -> String {
         let width = p.high.zip(p.low).map_or(0.0, |(high, low)| high - low);
         vec![p.name.clone(), p.unit.to_owned(), figures(p.value, width), p.interval(), p.by.clone()]
     });
-    let mut table = plain(&["parameter", "unit", "value", "95 % interval", "identified by"], rows);
-    // A broken key cannot be copied.
-    if let Some(keys) = table.column_mut(0) {
-        keys.set_constraint(ColumnConstraint::ContentWidth);
-    }
-    let mut text = format!("{} degrees of freedom\n{table}\n", found.degrees_of_freedom);
+    let table = plain(&["parameter", "unit", "value", "95 % interval", "identified by"], rows);
+    let mut text = format!("{} degrees of freedom\n{table}\n\n", found.degrees_of_freedom);
     let rows = found.residuals.iter().map(|left| {
         vec![
-            format!("{}, {}", left.log, left.channel),
+            format!("{}:\n  {}", left.log, left.channel),
             left.unit.to_owned(),
-            format!("{:.2e}", left.rms),
+            figures(left.rms, left.rms),
             left.count.to_string(),
             number(left.independent, 0),
         ]

@@ -57,7 +57,7 @@ fn human(mut keys: Vec<KeyInfo>) -> String {
     let group_of = |info: &KeyInfo| place(info).map_or(section(info), |_| "first".to_owned());
     keys.sort_by_key(|info| place(info).unwrap_or(usize::MAX));
     // Text throughout: every column is aligned to the left.
-    let mut table = plain(&[], []);
+    let mut table = plain(&[""; 0], []);
     table.set_header(["key, default", "what"].map(Cell::new));
     let mut group = String::new();
     for info in &keys {

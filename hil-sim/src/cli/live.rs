@@ -85,11 +85,8 @@ pub fn watch(
     }
     // In a terminal's raw mode Ctrl-C is a key.
     let stop = args.headless.then(Stop::by_ctrl_c);
-    let mut display = if args.headless {
-        None
-    } else {
-        Some(Display(ratatui::try_init().map_err(Failure::run)?))
-    };
+    let display = (!args.headless).then(|| ratatui::try_init().map(Display));
+    let mut display = display.transpose().map_err(Failure::run)?;
     let mut screen = Screen::new(Known::of(&scenario.rig).map_err(Failure::input)?, places);
     let mut clock = Clock::new(args.fast);
     let mut drawn = Instant::now();

@@ -1,5 +1,7 @@
 //! `rig montecarlo`: many random rigs.
 
+use std::collections::BTreeMap;
+
 use serde_json::json;
 
 use super::campaign::{CampaignArgs, Found};
@@ -51,7 +53,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
         outcome.completed,
         counted(outcome.slip_events, "slip event")
     );
-    print(&found, &args.campaign, &head, sound)
+    print(&found, &args.campaign, &wrapped(&head, "", width()), sound)
 }
 
 /// Runs `count` rigs, or the part of them that is asked for: the runs, and their outcome.
@@ -94,21 +96,22 @@ const COLUMNS: [Column; 11] = [
 ];
 
 fn human(outcome: &montecarlo::Outcome) -> String {
-    let mut text = figures(outcome).text();
+    let mut text = figures(outcome).text(&[]);
+    let mut seeds: BTreeMap<String, Vec<u64>> = BTreeMap::new();
     for fault in &outcome.faults {
         let code = fault.code.map_or("failure".to_owned(), |code| format!("fault {code}"));
-        text += &format!("  {code} in seed {}: {}\n", fault.seed, fault.text);
+        seeds.entry(format!("{code}: {}", fault.text)).or_default().push(fault.seed);
     }
-    for (what, seeds) in [
+    let others = [
         ("incomplete", &outcome.incomplete),
         ("of these without a word", &outcome.silent),
         ("slip, end or gap wrong and unreported", &outcome.unreported),
         ("stopped by a fault without slip or wide gap", &outcome.stopped_sound),
-    ] {
-        if !seeds.is_empty() {
-            let seeds: Vec<String> = seeds.iter().map(u64::to_string).collect();
-            text += &format!("  {what}: seeds {}\n", seeds.join(", "));
-        }
+    ];
+    let others = others.into_iter().filter(|(_, seeds)| !seeds.is_empty());
+    for (what, seeds) in seeds.iter().map(|(what, seeds)| (what.as_str(), seeds)).chain(others) {
+        let seeds: Vec<String> = seeds.iter().map(u64::to_string).collect();
+        text += &wrapped(&format!("{what}: seeds {}", seeds.join(", ")), "  ", width());
     }
     if !outcome.drawn.is_empty() {
         let rows = outcome

@@ -1,13 +1,13 @@
 //! Results on standard output.
 
-use std::io::{self, ErrorKind, Write};
+use std::io::{self, ErrorKind, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
 use super::failure::Failure;
 use crate::files::is_one_file;
-use crate::table::{NARROW, wrapped};
+use crate::table::{NARROW, width, wrapped};
 
 /// A result with the files that were written, as `--json` prints both.
 #[derive(Serialize)]
@@ -62,6 +62,15 @@ pub(super) fn ends_in(name: &str, to: &Path, ending: &str) -> Result<(), Failure
     let why = || format!("{name} {}: expected a name that ends in .{ending}", to.display());
     let is_so = to.extension().is_some_and(|found| found == ending);
     is_so.then_some(()).ok_or_else(|| Failure::input(why()))
+}
+
+/// Prints an error as one line, wrapped where a person reads it.
+pub(super) fn complain(error: &str) {
+    if io::stderr().is_terminal() {
+        eprint!("{}", wrapped(error, "", width()));
+    } else {
+        eprintln!("{error}");
+    }
 }
 
 /// Prints `text`. A reader that closes the pipe early is no error.

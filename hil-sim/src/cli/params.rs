@@ -1,7 +1,7 @@
 //! `rig params`: the parameters that a board, or a file, holds.
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use serde::Serialize;
 use toml::Value;
@@ -148,7 +148,8 @@ pub fn act(args: &Args, store: &mut impl Store) -> Result<Outcome, Failure> {
         Action::Restore { .. } => match file.zip(given) {
             Some((path, new)) => {
                 super::scenario::remind(&path.display().to_string(), &new);
-                replace(args, store, &scenario, &new, &stem(path))
+                let name = path.file_stem().unwrap_or("rig".as_ref()).to_string_lossy();
+                replace(args, store, &scenario, &new, &name)
             }
             None => {
                 store.restore()?;
@@ -191,10 +192,6 @@ fn not_here(sets: &[String]) -> Failure {
     let key = |set: &&String| ELSEWHERE.iter().any(|section| set.trim().starts_with(section));
     let set = sets.iter().find(key).map_or("", String::as_str);
     Failure::input(format!("{set}: belongs to a scenario, not to what a board holds"))
-}
-
-fn stem(path: &Path) -> String {
-    path.file_stem().map_or_else(|| "rig".to_owned(), |stem| stem.to_string_lossy().into_owned())
 }
 
 /// The keys that a board holds.

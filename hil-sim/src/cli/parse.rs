@@ -5,6 +5,7 @@ use std::process::ExitCode;
 use clap::error::ErrorKind;
 
 use super::failure::one_line;
+use super::output::complain;
 use crate::bringup::FARTHEST_MM;
 
 /// Prints help, the version, or the error; the exit code to end with.
@@ -16,7 +17,7 @@ pub(super) fn report(error: &clap::Error) -> ExitCode {
             // A reader that closes the pipe early is no error.
             let _ = error.print();
         }
-        _ => eprintln!("{}", line(&error.to_string())),
+        _ => complain(&line(&error.to_string())),
     }
     ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2))
 }

@@ -175,6 +175,5 @@ fn titled(mut runs: Vec<(String, &Recording)>) -> Vec<(String, &Recording)> {
 
 fn human(differences: &[Difference]) -> String {
     let (head, rows) = compared(differences);
-    let head: Vec<&str> = head.iter().map(String::as_str).collect();
     format!("{}\n", plain(&head, rows))
 }

@@ -61,12 +61,8 @@ pub struct RunArgs {
 
     /// A fault and its onset in seconds from boot, as in supply.weak@2, in place of the scenario's
     /// `run.faults`, which can say more; may be repeated.
-    #[arg(long, value_name = "TARGET.KIND@S")]
+    #[arg(long, alias = "board-fault", value_name = "TARGET.KIND@S")]
     fault: Vec<String>,
-
-    /// Another name of --fault.
-    #[arg(long, value_name = "TARGET.KIND@S")]
-    board_fault: Vec<String>,
 
     /// Draws by the seed, too, what the controller is not told: all of `mismatch.*` within
     /// its wide range.
@@ -120,38 +116,27 @@ impl RunArgs {
 
     /// The scenario; the options come after every `--set`.
     pub fn resolve(&self) -> Result<Scenario, Failure> {
-        let mut sets = Vec::new();
-        if self.retract {
-            sets.push("run.direction=retract".to_owned());
-        }
-        if self.wide {
-            sets.push("run.mismatch=wide".to_owned());
-        }
-        if self.adversarial {
-            sets.push("run.mismatch=adversarial".to_owned());
-        }
-        if let Some(controller) = &self.controller {
-            sets.push(format!("run.controller={controller}"));
-        }
-        if let Some(seed) = self.seed {
-            sets.push(format!("run.seed={seed}"));
-        }
-        let board_faults = self.board_fault.iter().map(|text| entry_of("--board-fault", text));
-        let faults = self.fault.iter().map(|text| entry_of("--fault", text)).chain(board_faults);
-        let faults = faults.collect::<Result<Vec<_>, _>>()?;
-        if !faults.is_empty() {
-            sets.push(format!("run.faults=[{}]", faults.join(",")));
-        }
+        let faults = self.fault.iter().map(entry_of).collect::<Result<Vec<_>, _>>()?;
+        let flag = |is_given: bool, set: &str| is_given.then(|| set.to_owned());
+        let sets = [
+            flag(self.retract, "run.direction=retract"),
+            flag(self.wide, "run.mismatch=wide"),
+            flag(self.adversarial, "run.mismatch=adversarial"),
+            self.controller.as_ref().map(|name| format!("run.controller={name}")),
+            self.seed.map(|seed| format!("run.seed={seed}")),
+            (!faults.is_empty()).then(|| format!("run.faults=[{}]", faults.join(","))),
+        ];
+        let sets: Vec<String> = sets.into_iter().flatten().collect();
         self.scenario.resolve_with(&sets)
     }
 }
 
-/// The entry of `run.faults` that a text of this option is.
-fn entry_of(option: &str, text: &str) -> Result<String, Failure> {
+/// The entry of `run.faults` that a text of --fault is.
+fn entry_of(text: &String) -> Result<String, Failure> {
     let parts = text.split_once('@').and_then(|(fault, at)| Some((fault.split_once('.')?, at)));
     let at = parts.and_then(|(_, at)| at.parse::<f64>().ok()).filter(|at| at.is_finite());
     let (Some(((target, kind), _)), Some(at)) = (parts, at) else {
-        let error = format!("{option} {text}: expected TARGET.KIND@SECONDS, as in supply.weak@2");
+        let error = format!("--fault {text}: expected TARGET.KIND@SECONDS, as in supply.weak@2");
         return Err(Failure::input(error));
     };
     Ok(format!("{{target={target:?},kind={kind:?},at_s={at:?}}}"))
@@ -176,8 +161,7 @@ mod tests {
             adversarial: false,
             controller: Some("limit".into()),
             seed: Some(5),
-            fault: vec!["supply.weak@2".into()],
-            board_fault: vec!["encoder-line-b.off@5.5".into()],
+            fault: vec!["supply.weak@2".into(), "encoder-line-b.off@5.5".into()],
         };
         let scenario = args.resolve().unwrap();
         assert_eq!(scenario.preset, "fe");
@@ -195,13 +179,10 @@ mod tests {
     #[test]
     fn a_fault_that_cannot_be_read_is_named() {
         for text in ["supply-dip@2", "supply.weak", "supply.weak@soon", "supply.weak@inf", "@2"] {
-            let fault = RunArgs { fault: vec![text.into()], ..RunArgs::default() };
-            let board_fault = RunArgs { board_fault: vec![text.into()], ..RunArgs::default() };
-            for (option, args) in [("--fault", fault), ("--board-fault", board_fault)] {
-                let error = args.resolve().unwrap_err().to_string();
-                let expected = format!("{option} {text}: expected TARGET.KIND@S");
-                assert!(error.starts_with(&expected), "{error}");
-            }
+            let args = RunArgs { fault: vec![text.into()], ..RunArgs::default() };
+            let error = args.resolve().unwrap_err().to_string();
+            let expected = format!("--fault {text}: expected TARGET.KIND@S");
+            assert!(error.starts_with(&expected), "{error}");
         }
         let args = RunArgs { fault: vec!["suply.weak@2".into()], ..RunArgs::default() };
         assert!(args.resolve().unwrap_err().to_string().contains("run.faults[1].target"));

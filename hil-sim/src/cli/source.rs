@@ -16,7 +16,7 @@ pub(super) const TARGETS: [&str; 3] = ["sil", "board", "probe"];
 #[derive(Debug, clap::Args)]
 pub struct SourceArgs {
     #[command(flatten)]
-    run: RunArgs,
+    pub run: RunArgs,
 
     /// Reads a recorded stream of the binary channel; `-` is standard input.
     #[arg(long, value_name = "FILE", conflicts_with = "target")]
@@ -50,11 +50,6 @@ impl SourceArgs {
                 act(&mut Probed::new(port), &scenario)
             }
         }
-    }
-
-    /// The scenario to run.
-    pub fn scenario(&self) -> Result<Scenario, Failure> {
-        self.run.resolve()
     }
 }
 

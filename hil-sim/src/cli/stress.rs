@@ -1,6 +1,5 @@
 //! `rig stress`: the plant at the ends of its ranges.
 
-use serde::Serialize;
 use serde_json::json;
 
 use super::campaign::CampaignArgs;
@@ -8,7 +7,7 @@ use super::failure::{Failure, Outcome};
 use super::scenario::seed;
 use crate::campaign::{Column, Frame, column};
 use crate::stress::{self, StressReport, Worst};
-use crate::table::{counted, is_narrow, width, wrapped};
+use crate::table::{counted, width, wrapped};
 
 /// The plant at the ends of every range.
 ///
@@ -32,15 +31,6 @@ pub(super) struct Args {
     pub(super) campaign: CampaignArgs,
 }
 
-/// What `--json` prints.
-#[derive(Serialize)]
-struct Printed<'a> {
-    #[serde(flatten)]
-    report: &'a StressReport,
-    /// Number of failures.
-    failures: usize,
-}
-
 pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     let campaign = stress::campaign(args.cases as usize, args.seed);
     let found = args.campaign.carry_out(format!("seed {}", args.seed), campaign)?;
@@ -52,7 +42,8 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
         row
     };
     let rows = Frame::of(&COLUMNS, report.worst.iter().map(row));
-    let printed = Printed { report, failures: report.failed.len() };
+    let mut printed = json!(report);
+    printed["failures"] = report.failed.len().into();
     found.print(&args.campaign, &printed, &rows, || human(report, &rows), report.failed.is_empty())
 }
 
@@ -70,7 +61,7 @@ const COLUMNS: [Column; 9] = [
 ];
 
 fn human(report: &StressReport, rows: &Frame) -> String {
-    let rows = rows.fitted(&["tau_s"], is_narrow()).text();
+    let rows = rows.text(&["tau_s", "stiffening"]);
     let mut text = format!("{} of the plant\n{rows}", counted(report.cases, "case"));
     for (name, refused) in &report.refused {
         let refused = format!("refused {}: {name}, as: {}", refused.count, refused.example);

@@ -10,8 +10,8 @@ use super::crossing::{Method, check, compute};
 use super::failure::{Failure, Outcome};
 use super::output;
 use super::scenario::RunArgs;
-use crate::campaign::{Campaign, Column, Frame, column};
-use crate::files::{make_directory, vacant_for, write_text};
+use crate::campaign::{AS_GIVEN, Campaign, Column, Frame, column};
+use crate::files::{make_directory, vacant, vacant_for, write_text};
 use crate::rollout::CrossingSetup;
 use crate::scenario::{Direction, Scenario};
 use crate::session::{self, Options};
@@ -97,15 +97,15 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     let found = args.campaign.carry_out(base.to_toml(), campaign)?;
     let keys = axes.iter().map(|Axis { key, .. }| Column {
         key: key.clone().into(),
-        name: key.clone().into(),
-        ..column("", "", "", 6)
+        name: key.replace('.', ".\n").into(),
+        ..column("", "", "", AS_GIVEN)
     });
     let columns: Vec<Column> = keys.chain(measure.columns.iter().cloned()).collect();
     let (rows, table) = (&found.outcome, Frame::of(&columns, &found.outcome));
     let write = || write(args, &axes, rows, &table.csv(), &measure);
     let files = if args.no_files { Vec::new() } else { write()? };
     let printed = json!({ "rows": rows, "files": files });
-    let text = || table.text() + &output::wrote(&files);
+    let text = || table.text(&["gap_over_ref", "faults"]) + &output::wrote(&files);
     found.print(&args.campaign, &printed, &table, text, true)
 }
 
@@ -196,6 +196,10 @@ impl Point {
     }
 }
 
+const fn plot(column: &'static str, title: &'static str, y_name: &'static str) -> Plot {
+    Plot { column, title, y_name }
+}
+
 fn of_run() -> Measure {
     const COLUMNS: &[Column] = &[
         column("completed", "completed", "", 0),
@@ -205,7 +209,6 @@ fn of_run() -> Measure {
         column("slip_mm", "slip", "mm", 3),
         column("faults", "faults", "", 0),
     ];
-    let plot = |column, title, y_name| Plot { column, title, y_name };
     let plots = vec![
         plot("max_gap_mm", "Worst gap", "gap, mm"),
         plot("duration_s", "Duration from the command", "duration, s"),
@@ -222,7 +225,6 @@ fn of_crossing(is_driven: bool) -> Measure {
         column("climb_work_mj", "work", "mJ", 1),
         column("mu_needed", "friction\nneeded", "", 3),
     ];
-    let plot = |column, title, y_name| Plot { column, title, y_name };
     let mut plots = vec![
         plot("gap_mm", "Gap of the crossing", "gap, mm"),
         plot("corner_force_n", "Corner force", "force, N"),
@@ -242,17 +244,14 @@ fn write(
 ) -> Result<Vec<PathBuf>, Failure> {
     let keys: Vec<&str> = axes.iter().map(|axis| &*axis.key).collect();
     let what = if args.crossing { "crossing" } else { "deploy" };
-    let usual = || Path::new("out").join(format!("sweep-{what}-{}", keys.join("-")));
-    let directory = args.out.clone().unwrap_or_else(usual);
-    let directory = if args.out.is_some() {
-        directory
-    } else {
-        // Another sweep of these keys keeps its folder.
-        let file = |folder: &Path| folder.join("sweep.csv");
-        crate::files::vacant(&directory, |folder| vacant_for(&file(folder), table) == file(folder))
-    };
+    // Another sweep of these keys keeps its folder.
+    let file = |folder: &Path| folder.join("sweep.csv");
+    let directory = args.out.clone().unwrap_or_else(|| {
+        let usual = Path::new("out").join(format!("sweep-{what}-{}", keys.join("-")));
+        vacant(&usual, |folder| vacant_for(&file(folder), table) == file(folder))
+    });
     make_directory(&directory)?;
-    let mut files = vec![directory.join("sweep.csv")];
+    let mut files = vec![file(&directory)];
     write_text(&files[0], table)?;
     if let Some(picture) = sweep::picture(axes, rows, &measure.plots) {
         files.push(directory.join("sweep.svg"));

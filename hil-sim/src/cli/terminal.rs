@@ -11,9 +11,8 @@ use crate::report::verdict::{Grade, gap_sentence, headline, origin, slip_sentenc
 use crate::report::{COLUMNS, slowed_by};
 use crate::table::{number, plain, wrapped};
 
-/// Most columns of a run's text, and of its table with every column.
+/// Most columns of a run's text.
 const WIDTH: u16 = 80;
-const WIDE: u16 = 160;
 
 /// The run of `summary` as text, with the paths of `files` at the end; `all` columns of the
 /// crossings or those that matter most. Ends with a line feed.
@@ -71,20 +70,26 @@ fn details(s: &Summary) -> String {
     parts.join("; ")
 }
 
+/// A row a crossing; with `all` quantities a row each.
 fn ledger(crossings: &[CrossingLine], all: bool) -> Table {
     let columns = || COLUMNS.iter().filter(|column| all || column.on_terminal);
-    let names: Vec<String> = columns().map(|c| format!("{}\n{}", c.name, c.unit)).collect();
-    let head: Vec<&str> = std::iter::once("step")
-        .chain(names.iter().map(String::as_str))
-        .chain(["slowed\nby"])
-        .collect();
+    let (between, by) = if all { (", ", "slowed by") } else { ("\n", "slowed\nby") };
+    let names = columns().map(|c| format!("{}{between}{}", c.name, c.unit));
+    let names = names.map(|name| name.trim_end_matches(between).to_owned());
+    let head = std::iter::once("step".to_owned()).chain(names).chain([by.to_owned()]);
     let rows = crossings.iter().map(|line| {
         let cells = columns().map(|column| number((column.of)(line), column.decimals));
         let by = slowed_by(line).to_owned();
         std::iter::once(line.index.to_string()).chain(cells).chain([by]).collect()
     });
-    let mut table = plain(&head, rows);
-    table.set_width(if all { WIDE } else { WIDTH });
+    let mut lines: Vec<Vec<String>> = std::iter::once(head.collect()).chain(rows).collect();
+    if all {
+        lines = (0..lines[0].len())
+            .map(|quantity| lines.iter().map(|line| line[quantity].clone()).collect())
+            .collect();
+    }
+    let mut table = plain(&lines[0], lines[1..].iter().cloned());
+    table.set_width(WIDTH);
     table
 }
 
@@ -102,8 +107,8 @@ mod tests {
     #[test]
     fn nothing_is_wider_than_the_terminal() {
         for recording in [example::deploy(), example::faulted()] {
-            let text = run(&recording.summary, &[], false);
-            for line in text.lines() {
+            let [text, all] = [false, true].map(|all| run(&recording.summary, &[], all));
+            for line in text.lines().chain(all.lines()) {
                 assert!(line.chars().count() <= usize::from(WIDTH), "{line}");
             }
         }
@@ -125,7 +130,8 @@ mod tests {
         assert!(text.contains(" measured "), "no heading is broken: {text}");
         let words = ["preload limit", "preload slew"];
         assert!(words.iter().any(|words| line.contains(words)), "{line}");
-        assert!(!text.contains(" predicted ") && run(&summary, &[], true).contains(" predicted "));
+        assert!(!text.contains(" predicted"));
+        assert!(run(&summary, &[], true).contains("\n predicted, mm "), "a row each");
         assert!(text.ends_with("  wrote out/run/report.html\n"));
         let files = ["report.html", "log.csv"].map(|name| PathBuf::from("out/run").join(name));
         assert!(run(&summary, &files, false).ends_with("/: report.html, log.csv\n"));

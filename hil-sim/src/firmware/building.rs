@@ -18,7 +18,7 @@ pub(super) fn run(cargo: &mut Command, what: &str) -> io::Result<(ExitStatus, St
         if line.contains("\"fresh\":false") {
             compiled += 1;
             if compiled == 1 {
-                progress.line(&format!("building {what}, once"));
+                progress.line(&format!("building {what}, once: up to some minutes"));
             }
             progress.say(&format!("building {what}: {} compiled", counted(compiled, "unit")));
         }

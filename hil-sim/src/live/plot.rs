@@ -10,12 +10,13 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::{Axis, Block, Chart, Dataset, GraphType};
 
 use crate::record::Controller;
+use crate::report::axis::extent;
 use crate::table::label;
 
 /// Time span of the plots, s.
 pub(super) const SPAN_S: f64 = 10.0;
-/// Least height of a plot with a labelled time axis, lines.
-const WITH_TIMES: u16 = 10;
+/// Most intervals of an axis: so many rows a small plot has.
+const INTERVALS: f64 = 4.0;
 
 /// What a plot has of a tick.
 pub(super) struct Row {
@@ -98,36 +99,39 @@ impl Plot {
     /// Draws the rows of the last seconds, of which `end_s` is the latest.
     pub(super) fn draw(&self, frame: &mut Frame<'_>, area: Rect, rows: &VecDeque<Row>, end_s: f64) {
         let points = |of: fn(&Row) -> f64| -> Vec<(f64, f64)> {
-            let all = rows.iter().map(|row| (row.seen.t_s, of(row)));
-            all.filter(|point| point.1.is_finite()).collect()
+            rows.iter().map(|row| (row.seen.t_s, of(row))).collect()
         };
         let lines: Vec<_> = self.curves.iter().map(|(.., of)| points(*of)).collect();
         // Before a step and behind it the clearance is unrelated to the gap.
         let shown = self.curves.iter().zip(&lines).filter(|(curve, _)| curve.2 != Look::Dots);
         let fitted = shown.flat_map(|(_, line)| line).map(|point| point.1);
-        let (low, high) = range(fitted, self.least);
-        let sets = self.curves.iter().zip(&lines).map(|((_, colour, look, _), points)| {
+        let marks = marks(fitted, self.least);
+        let sets = self.curves.iter().zip(&lines).flat_map(|((_, colour, look, _), points)| {
             let (marker, kind) = match look {
                 Look::Line => (Marker::Braille, GraphType::Line),
                 Look::Dots => (Marker::Braille, GraphType::Scatter),
                 Look::Marks => (Marker::Dot, GraphType::Scatter),
             };
             let style = Style::new().fg(*colour);
-            Dataset::default().marker(marker).graph_type(kind).style(style).data(points)
+            // A curve ends where its value is unknown.
+            let parts = points.split(|point| !point.1.is_finite()).filter(|part| !part.is_empty());
+            let set = Dataset::default().marker(marker).graph_type(kind).style(style);
+            parts.map(move |part| set.clone().data(part))
         });
-        let digits = if high - low < 1.0 { 2 } else { 1 };
-        let axis = |low: f64, high: f64| Axis::default().bounds([low, high]);
+        let (low, high) = (marks[0], marks[marks.len() - 1]);
+        let digits = if marks[1] - low < 1.0 { 2 } else { 0 };
         let begin_s = end_s - SPAN_S;
-        let mut across = axis(begin_s, end_s);
-        if area.height >= WITH_TIMES {
-            across = across.labels([begin_s, end_s].map(|at| format!("{at:.1} s")));
-        }
-        let labels = [low, 0.5 * (low + high), high].map(|value| label(value, digits));
+        let [begin, end] = [begin_s, end_s].map(|at| Line::from(format!("{at:.1} s")));
+        let block = Block::bordered().title(self.title());
         let chart = Chart::new(sets.collect())
             .legend_position(None)
-            .block(Block::bordered().title(self.title()))
-            .x_axis(across)
-            .y_axis(axis(low, high).labels(labels));
+            .block(block.title_bottom(begin).title_bottom(end.right_aligned()))
+            .x_axis(Axis::default().bounds([begin_s, end_s]))
+            .y_axis(
+                Axis::default()
+                    .bounds([low, high])
+                    .labels(marks.iter().map(|mark| label(*mark, digits))),
+            );
         frame.render_widget(chart, area);
     }
 
@@ -141,15 +145,20 @@ impl Plot {
     }
 }
 
-/// Range of the values, at least so wide.
-fn range(values: impl Iterator<Item = f64>, least: f64) -> (f64, f64) {
-    let (low, high) =
-        values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
-    if low > high {
-        return (0.0, least);
-    }
-    let lacking = (least - (high - low)).max(0.0);
-    (low - 0.5 * lacking, high + 0.5 * lacking)
+/// Round numbers over the range of the values and at least so wide, two or more.
+fn marks(values: impl Iterator<Item = f64>, least: f64) -> Vec<f64> {
+    let (low, high) = extent(values).unwrap_or((0.0, least));
+    let lacking = 0.5 * (least - (high - low)).max(0.0);
+    let ends = |step: f64| {
+        // Noise around a mark takes no interval more.
+        let (low, high) = ((low - lacking) / step, (high + lacking) / step);
+        ((low + 0.02).floor(), (high - 0.02).ceil())
+    };
+    let steps = (-2..6).flat_map(|decade| [1.0, 2.0, 5.0].map(|n| n * 10_f64.powi(decade)));
+    let fits = |step: &f64| ends(*step).1 - ends(*step).0 <= INTERVALS;
+    let step = steps.into_iter().find(fits).unwrap_or(1e6);
+    let (first, last) = ends(step);
+    (first as i64..=last as i64).map(|n| n as f64 * step).collect()
 }
 
 #[cfg(test)]
@@ -157,16 +166,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_range_is_never_narrower_than_asked() {
-        assert_eq!(range([1.0, 2.0].into_iter(), 4.0), (-0.5, 3.5));
-        assert_eq!(range([].into_iter(), 4.0), (0.0, 4.0));
-        assert_eq!(range([0.0, 9.0].into_iter(), 4.0), (0.0, 9.0));
-    }
-
-    #[test]
-    fn the_first_plots_have_their_legend_in_half_a_small_terminal() {
-        for plot in &PLOTS[..4] {
-            assert!(plot.title().width() <= 38, "{}", plot.title());
-        }
+    fn marks_are_round_and_never_narrower_than_asked() {
+        assert_eq!(marks([1.0, 2.0].into_iter(), 4.0), [-2.0, 0.0, 2.0, 4.0]);
+        assert_eq!(marks([].into_iter(), 4.0), [0.0, 1.0, 2.0, 3.0, 4.0]);
+        assert_eq!(marks([-0.1, 27.8, f64::NAN].into_iter(), 2.0), [0.0, 10.0, 20.0, 30.0]);
+        assert_eq!(marks([2.65].into_iter(), 1.5), [1.5, 2.0, 2.5, 3.0, 3.5]);
     }
 }

@@ -17,7 +17,7 @@ use ratatui::text::Line;
 use ratatui::widgets::{Block, Paragraph};
 
 use super::plot::{PLOTS, Row, SPAN_S};
-use crate::record::{Controller, Counts, Item, LedgerLine, Mark, View, text};
+use crate::record::{Controller, Counts, Item, LedgerLine, Mark, View, shown, text};
 use crate::report::Geometry;
 
 /// Ticks between two points of a plot.
@@ -84,7 +84,7 @@ impl Screen {
         self.view.see(item);
         match item {
             Item::Tick(record, sensors) => {
-                let row = Controller::of(record, sensors);
+                let row = shown(record, sensors);
                 let on_corner = [ContactStage::StaticFriction, ContactStage::Sliding];
                 let was_there =
                     on_corner.iter().all(|at| [self.stage, row.stage].contains(&(*at as u8)));
@@ -182,8 +182,10 @@ impl Screen {
 
         let skip = self.lines.len().saturating_sub(usize::from(log.height.saturating_sub(2)));
         let lines = self.lines.iter().skip(skip);
-        let lines: Vec<Line<'_>> =
-            lines.map(|(colour, text)| Line::styled(text, Style::new().fg(*colour))).collect();
+        let line = |(colour, text): &(Color, String)| {
+            Line::styled(cut(text, log.width.saturating_sub(2)), Style::new().fg(*colour))
+        };
+        let lines: Vec<Line<'_>> = lines.map(line).collect();
         let block = Block::bordered().title("log; the plots show its last 10 s");
         frame.render_widget(Paragraph::new(lines).block(block), log);
         let style = Style::new().fg(Color::Black).bg(Color::Gray);
@@ -198,6 +200,14 @@ impl Screen {
             Some(mode) if mode.moves() => strong.fg(Color::Green),
             _ => strong,
         }
+    }
+}
+
+/// `text` in so many columns; an ellipsis is at the end of a longer one.
+fn cut(text: &str, columns: u16) -> String {
+    match text.char_indices().nth(columns.into()) {
+        Some(_) => text.chars().take(columns.saturating_sub(1).into()).chain(['…']).collect(),
+        None => text.to_owned(),
     }
 }
 
@@ -258,6 +268,7 @@ mod tests {
             "gap, mm ─wanted ─clearance •measured",
             "compression, mm ─measured",
             "mode: deployed",
+            " s──",
             "SPACE or x stop",
             "the drive runs on",
         ];
@@ -269,6 +280,8 @@ mod tests {
             for part in always.iter().chain(more) {
                 assert!(text.contains(part), "{width}x{height}: no {part} in\n{text}");
             }
+            let cut = lines.iter().any(|line| line.contains("crossing 3") && line.ends_with("…│"));
+            assert!(cut || width == 80, "{text}");
             // Nothing ends at the edge: the last column of the lines above the plots is free.
             for line in &lines[..5] {
                 assert!(line.ends_with(' '), "{line}");

@@ -137,6 +137,7 @@ impl RunRecorder {
         let cruise_mm_s = scenario.rig.drive.cruise_speed_mm_s;
         let has_gap = !crossings.is_empty() || worst > 0.0;
         let total_s = self.time_s();
+        let commanded_s = self.run_started.and(self.commanded);
         let summary = Summary {
             completed,
             target: target.into(),
@@ -147,8 +148,8 @@ impl RunRecorder {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             overrides: scenario.overrides(),
             drawn: drawn(plant.parameters(), scenario),
-            commanded_s: self.run_started.and(self.commanded),
-            duration_s: self.run_started.and(self.commanded).map(|from| self.run_ended - from),
+            commanded_s,
+            duration_s: commanded_s.map(|from| self.run_ended - from),
             moving_s: self.run_started.map_or(0.0, |from| self.run_ended - from),
             lost: completed.then(|| self.split.lost(cruise_mm_s)),
             total_s,
@@ -159,7 +160,7 @@ impl RunRecorder {
             mean_preload_n: self.preload_sum / f64::from(self.moving.max(1)),
             energy_j: truth.work_mj * 1e-3,
             friction_work_j: truth.friction_work_mj * 1e-3,
-            injected: scenario.run.faults.iter().map(ToString::to_string).collect(),
+            injected: scenario.run.faults.iter().map(|fault| fault.words(commanded_s)).collect(),
             real_time_factor: total_s / wall_s.max(1e-9),
             trace_digest: self.digest.finalize().iter().map(|b| format!("{b:02x}")).collect(),
             crossings,

@@ -2,38 +2,55 @@
 
 use std::time::Instant;
 
+use interstage::log::Record;
+use interstage::sense::raw::SensorFrame;
+
 use super::{Controller, Counts, Item, Mark, mode_words, stage_name, text};
 use crate::table::{counted, number};
 
-/// The latest items of a log, and its rates.
-pub struct View {
-    row: Option<Controller>,
-    rig: String,
-    event: String,
-    mark: Option<Mark>,
-    counted: (Instant, Counts),
-    /// Ticks and bytes a second.
-    rates: (f64, f64),
-}
+/// Ticks without an answer after which nothing is shown of a sensor.
+const SILENT: u32 = 50;
 
-impl Default for View {
-    fn default() -> Self {
-        Self {
-            row: None,
-            rig: "unknown".to_owned(),
-            event: String::new(),
-            mark: None,
-            counted: (Instant::now(), Counts::default()),
-            rates: (0.0, 0.0),
+/// The columns of a tick as a view shows them: unknown is what a silent sensor gave last, and a
+/// gap that no plan predicts.
+pub(crate) fn shown(record: &Record, sensors: &SensorFrame) -> Controller {
+    let mut row = Controller::of(record, sensors);
+    let now = row.tick;
+    for (at, value) in [
+        (row.wheel_encoder_at, &mut row.position_mm),
+        (row.wheel_encoder_at, &mut row.wheel_speed_mm_s),
+        (row.wheel_encoder_at.min(row.preload_at), &mut row.slip_margin),
+        (row.preload_at, &mut row.preload_n),
+        (row.compression_at, &mut row.compression_mm),
+        (row.arm_angle_at, &mut row.radius_mm),
+    ] {
+        if at.is_none_or(|at| now.saturating_sub(at) > SILENT) {
+            *value = f64::NAN;
         }
     }
+    if row.gap_predicted_mm == 0.0 {
+        row.gap_predicted_mm = f64::NAN;
+    }
+    row
+}
+
+/// The latest items of a log, and its rates.
+#[derive(Default)]
+pub struct View {
+    row: Option<Controller>,
+    rig: Option<String>,
+    event: String,
+    mark: Option<Mark>,
+    counted: Option<(Instant, Counts)>,
+    /// Ticks and bytes a second.
+    rates: (f64, f64),
 }
 
 impl View {
     pub fn see(&mut self, item: &Item) {
         match item {
-            Item::Tick(record, sensors) => self.row = Some(Controller::of(record, sensors)),
-            Item::Identity(identity) => self.rig = identity.rig.as_str().to_owned(),
+            Item::Tick(record, sensors) => self.row = Some(shown(record, sensors)),
+            Item::Identity(identity) => self.rig = Some(identity.rig.as_str().to_owned()),
             Item::Event(entry) => self.event = text(&entry.event),
             Item::Mark(mark) => self.mark = Some(*mark),
             Item::Plan(..) | Item::Request(..) | Item::CaptureChunk(_) | Item::Ledger(_) => {}
@@ -42,14 +59,15 @@ impl View {
 
     /// Computes the rates at most once in half a second; returns whether it did.
     pub fn count(&mut self, counts: &Counts) -> bool {
-        let (since, before) = &self.counted;
+        let (since, before) =
+            self.counted.get_or_insert_with(|| (Instant::now(), Counts::default()));
         let passed = since.elapsed().as_secs_f64();
         if passed < 0.5 {
             return false;
         }
         let rate = |now: u64, before: u64| (now - before) as f64 / passed;
         self.rates = (rate(counts.ticks, before.ticks), rate(counts.bytes, before.bytes));
-        self.counted = (Instant::now(), *counts);
+        self.counted = Some((Instant::now(), *counts));
         true
     }
 
@@ -63,7 +81,7 @@ impl View {
         let (ticks, bytes) = self.rates;
         format!(
             "rig {}  {}, {ticks:.0}/s, {:.0} kB/s  lost {}, {}  restarts {}",
-            self.rig,
+            self.rig.as_deref().unwrap_or("unknown"),
             counted(counts.ticks, "tick"),
             bytes * 1e-3,
             counted(counts.lost_frames, "frame"),
@@ -78,26 +96,22 @@ impl View {
         self.row.map_or_else(String::new, |row| {
             let mode = row.mode().map_or_else(|| "unknown mode".to_owned(), mode_words);
             let stage = stage_name(row.stage);
-            let state = format!(
-                " {:9.2} s  {mode:25}  contact: {stage:15}  level {}\n",
-                row.t_s, row.level
-            );
-            let motion = format!(
-                " position {:>6} mm   speed {:>5} of {:>5} mm/s   preload {:>5} of {:>5} N\n",
+            format!(
+                " {:9.2} s  {mode:25}  contact: {stage:15}  level {}\n \
+                 position {:>6} mm   speed {:>5} of {:>5} mm/s   preload {:>5} of {:>5} N\n \
+                 compression {:>4} mm  radius {:>5} mm  gap predicted {:>4} mm  slip margin {:>5}",
+                row.t_s,
+                row.level,
                 number(row.position_mm, 2),
                 number(row.wheel_speed_mm_s, 2),
                 number(row.speed_ref_mm_s, 2),
                 number(row.preload_n, 1),
-                number(row.preload_ref_n, 1)
-            );
-            let contact = format!(
-                " compression {:>4} mm  radius {:>5} mm  gap predicted {:>4} mm  slip margin {:>5}",
+                number(row.preload_ref_n, 1),
                 number(row.compression_mm, 2),
                 number(row.radius_mm, 1),
                 number(row.gap_predicted_mm, 2),
                 number(row.slip_margin, 2)
-            );
-            state + &motion + &contact
+            )
         })
     }
 
@@ -122,11 +136,23 @@ mod tests {
     fn the_state_shows_what_came_last() {
         let stream = session::run(&Scenario::default(), session::Options::ROWS).unwrap().stream;
         let (mut view, mut decoder) = (View::default(), Decoder::new());
-        decoder.read(&stream, &mut |item| view.see(&item));
+        let mut first = None;
+        decoder.read(&stream, &mut |item| {
+            view.see(&item);
+            first = first.take().or_else(|| view.row().map(|_| view.state_text()));
+        });
+        assert!(first.is_some_and(|text| text.contains("gap predicted    - mm")));
         let text = view.text(decoder.counts());
         for part in ["rig prototype", "deployed", "level 3", "lost 0 frames", "position"] {
             assert!(text.contains(part), "{part} in {text}");
         }
         assert!(!view.count(decoder.counts()), "too early for a rate");
+        let mut now = *view.row().unwrap();
+        now.wheel_encoder_at = Some(now.tick - SILENT - 1);
+        let row = shown(
+            &Record { telemetry: now.telemetry().unwrap(), ..Record::default() },
+            &now.sensors(),
+        );
+        assert!(row.wheel_speed_mm_s.is_nan() && row.position_mm.is_nan() && row.preload_n > 0.0);
     }
 }

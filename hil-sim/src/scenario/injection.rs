@@ -6,6 +6,8 @@ use serde::{Deserialize, Serialize};
 
 pub use catalogue::{CATALOGUE, Entry, HARDWARE, entry};
 
+use crate::table::label;
+
 /// When a fault begins.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Onset {
@@ -75,33 +77,26 @@ impl Injection {
         let usual = entry(self.target, self.kind).map_or(0.0, |entry| entry.magnitude);
         self.magnitude.unwrap_or(usual)
     }
-}
 
-impl std::fmt::Display for Injection {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{} {}", self.target.name(), self.kind.name())?;
-        if let Some(entry) = entry(self.target, self.kind)
-            && !entry.unit.is_empty()
-        {
-            write!(f, " ({} {})", self.magnitude(), entry.unit)?;
-        }
-        match self.from() {
-            Onset::Time(s) => write!(f, " from {s} s")?,
-            Onset::Position(mm) => write!(f, " from {mm} mm")?,
-            Onset::Crossing(n) => write!(f, " from crossing {n}")?,
-        }
-        match self.duration_s {
-            Some(s) => write!(f, " for {s} s"),
-            None => Ok(()),
-        }
+    /// In words; its time also from the command, as that of a report, if there was one.
+    pub fn words(&self, commanded_s: Option<f64>) -> String {
+        let unit = entry(self.target, self.kind).map_or("", |entry| entry.unit);
+        let size = if unit.is_empty() { "" } else { &format!(" ({} {unit})", self.magnitude()) };
+        let onset = match (self.from(), commanded_s) {
+            (Onset::Time(s), Some(from)) => format!("{} s ({s} s from boot)", label(s - from, 3)),
+            (Onset::Time(s), None) => format!("{s} s"),
+            (Onset::Position(mm), _) => format!("{mm} mm"),
+            (Onset::Crossing(n), _) => format!("crossing {n}"),
+        };
+        let end = self.duration_s.map_or(String::new(), |s| format!(" for {s} s"));
+        format!("{} {}{size} from {onset}{end}", self.target.name(), self.kind.name())
     }
 }
 
-/// What breaks.
+/// What breaks; the catalogue describes each fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Target {
-    /// Wheel encoder.
     Encoder,
     PreloadSensor,
     CompressionSensor,
@@ -109,9 +104,7 @@ pub enum Target {
     Angle,
     /// Converter that reads the outputs of both bridges.
     Readback,
-    /// Readback of the drive's bridge.
     DriveReadback,
-    /// Readback of the pre-tightener's bridge.
     PretightenerReadback,
     /// Drive motor or its bridge.
     Drive,
@@ -121,16 +114,12 @@ pub enum Target {
     Wheel,
     /// Rubber of the wheel.
     Tread,
-    /// Spring of the pre-tightener.
     Spring,
-    /// Top load.
     Load,
-    /// Control tick.
     Tick,
     Model,
     /// Reader of the log.
     Log,
-    /// Source of the commands.
     Commands,
     /// The controller, which starts again.
     Reset,
@@ -138,11 +127,8 @@ pub enum Target {
     /// Converter of the compression sensor.
     TreadConverter,
     AngleBus,
-    /// Line A of the wheel encoder.
     EncoderLineA,
-    /// Line B of the wheel encoder.
     EncoderLineB,
-    /// Direct memory access.
     Dma,
     /// Timer that wakes the tasks.
     Timer,
@@ -154,7 +140,6 @@ pub enum Target {
     PreloadSensorTask,
     CompressionSensorTask,
     ArmAngleTask,
-    /// Task of the control tick.
     TickTask,
     ModelTask,
     JournalTask,
@@ -173,9 +158,7 @@ pub enum Target {
     ParameterSave,
     /// The image in flash, after its first start.
     Image,
-    /// Magnet of the arm angle sensor.
     Magnet,
-    /// Wire of the emergency stop.
     StopWire,
     OptionBytes,
 }
@@ -188,27 +171,19 @@ pub enum Kind {
     Off,
     /// Keeps its last value.
     Stuck,
-    /// Gives random codes.
     Garbage,
-    /// Multiplies its value.
     Gain,
-    /// Adds a constant.
     Offset,
-    /// Follows slowly.
     Slow,
-    /// Follows late.
     Delayed,
     /// Fails for a part of every 100 ms.
     Intermittent,
-    /// Does not move.
     Stalled,
     /// Keeps a part of its force.
     Weak,
-    /// Moves in the wrong direction.
     Reversed,
     /// Moves at full duty whenever its bridge is on.
     Runaway,
-    /// Loses friction.
     Slip,
     /// A sector is soft; a save is cut by a loss of power.
     Torn,
@@ -216,26 +191,17 @@ pub enum Kind {
     Doubled,
     /// Is late, so that ticks are lost.
     Overrun,
-    /// Does not answer.
     Hung,
-    /// Is absent.
     Gone,
-    /// Occurs in every tick.
     Flooding,
-    /// Occurs at random.
     Random,
-    /// Flips bits.
     BitErrors,
     Reset,
     /// Starts again with its record.
     Recorded,
-    /// Regulates its current.
     Regulating,
-    /// Misses a clock edge.
     Disturbed,
-    /// Has one wrong bit, which is corrected.
     OneWrongBit,
-    /// Has two wrong bits, which are reported.
     TwoWrongBits,
     Halted,
     Shorted,

@@ -75,6 +75,9 @@ fn a_run_with_a_fault_of_its_scenario_ends_in_it_and_reports_it() {
     assert_eq!(summary.faults.iter().map(|fault| fault.code).collect::<Vec<_>>(), [116]);
     assert!(!summary.completed && (10.0..14.0).contains(&summary.travel_mm), "{summary:?}");
     assert_eq!(summary.injected, ["preload-sensor stuck from 10 mm"]);
+    let off = Injection::at(Target::Encoder, Kind::Off, 2.5, 0.0);
+    assert_eq!(off.words(Some(0.357)), "encoder off from 2.143 s (2.5 s from boot)");
+    assert_eq!(off.words(None), "encoder off from 2.5 s");
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use super::{good, number, object, refused, refused_in, rig, rig_in, stderr, stdout};
+use super::{good, number, object, refused_in, rig, rig_in, stderr, stdout};
 
 /// A crossing on the study's rig.
 fn crossing(speed: f64, preload: f64, more: &[&str]) -> Value {
@@ -84,16 +84,6 @@ fn a_wheel_that_sinks_in_has_no_gap_and_exits_with_one() {
         assert!(output.stdout.is_empty());
         let text = stderr(&output);
         assert!(text.starts_with("error: ") && text.contains("no gap"), "{text}");
-    }
-}
-
-#[test]
-fn the_reduced_model_is_refused_and_the_methods_that_there_are_named() {
-    for verb in
-        [&["crossing", "--speed-mm-s", "5", "--preload-n", "33"][..], &["sweep", "--crossing"]]
-    {
-        let asked = [verb, &["--method", "reduced"]].concat();
-        refused(&asked, &["--method reduced", "gone", "ring or fixed"]);
     }
 }
 

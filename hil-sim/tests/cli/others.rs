@@ -95,7 +95,7 @@ fn cargo_that(built: &str, fresh: bool) -> (tempfile::TempDir, std::path::PathBu
 #[cfg(unix)]
 #[test]
 fn a_build_is_announced_only_when_something_is_built() {
-    for (fresh, said) in [(true, ""), (false, "building the study, once\n")] {
+    for (fresh, said) in [(true, ""), (false, "building the study, once: up to some minutes\n")] {
         let (_directory, cargo) = cargo_that("/bin/true", fresh);
         let mut rig = Command::new(env!("CARGO_BIN_EXE_rig"));
         let output = rig.env("CARGO", cargo).arg("modes").output().expect("the command starts");

@@ -38,7 +38,8 @@ fn a_grid_of_deployments_has_rows_table_and_picture() {
     // Other values of the same key leave it alone.
     let other = ["sweep", "--key", "tread.tau_s=0.1,0.2", "--key", "run.controller=limit"];
     let output = rig_in(at, &other);
-    assert!(stdout(&output).contains("-2/: sweep.csv"), "{}", stdout(&output));
+    let text = stdout(&output);
+    assert!(text.contains("-2/: sweep.csv") && text.contains("\n 0.1  "), "{text}");
     assert_eq!(std::fs::read_to_string(&files[0]).unwrap(), table);
 }
 
