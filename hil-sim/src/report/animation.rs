@@ -219,15 +219,24 @@ mod tests {
         let scene = Scene::new(&recording).unwrap();
         let times = scene.crossings.iter().flat_map(|c| [c.touch_s, c.lift_s]);
         let times: Vec<f64> = times.map(|t_s| (1e3 * t_s).floor() * 1e-3).collect();
+        // Where the axle passes the first face, the load jumps from corner to wall.
+        let face_mm = scene.crossings[0].face_mm;
+        let place = scene.rows.iter().position(|row| row[1] >= face_mm).unwrap();
+        let [before, behind] = [scene.rows[place - 1], scene.rows[place]];
         let program = format!(
-            "{SCRIPT}\nconst scene = {};\nconst out = {times:?}.map((t) => {{\n\
+            "{SCRIPT}\nconst scene = {};\n\
+const jump = rowAt(scene, {}), edge = pose(scene, {{ ...jump, position_mm: {face_mm} + 0.01, corner_force_n: 50 }}).edge;\n\
+if (jump.corner_force_n !== 0 || jump.floor_force_n !== {} || edge[0] !== {face_mm}) throw new Error(JSON.stringify([jump, edge]));\n\
+const out = {times:?}.map((t) => {{\n\
 const row = rowAt(scene, t), p = pose(scene, row);\n\
 const arm = Math.hypot(p.pivot[0] - p.x, p.pivot[1] - p.y);\n\
 const gap = Math.hypot(p.root[0] - p.rim[0], p.root[1] - p.rim[1]);\n\
 return [p.x, p.y, gap, p.edge[0], p.edge[1], arm, p.spring_mm, phase(scene, row).length, \
 current(scene, t).index];\n\
 }});\nconsole.log(JSON.stringify(out));\n",
-            scene.json()
+            scene.json(),
+            before[0] + 0.3 * (behind[0] - before[0]),
+            behind[7],
         );
         node.stdin.take().unwrap().write_all(program.as_bytes()).unwrap();
         let done = node.wait_with_output().unwrap();

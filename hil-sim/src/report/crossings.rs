@@ -50,12 +50,10 @@ pub(super) fn view<'a>(recording: &'a Recording, line: &CrossingLine) -> View<'a
 fn panels(view: &View) -> Vec<Panel> {
     let mut clearance = view.gap();
     clearance.title = "Clearance at the step root".to_owned();
-    let mut forces = view.panel("Forces of corner and lower wall", "force, N");
+    let mut forces = view.panel("Forces of corner and wall", "force, N");
     forces.lines = vec![
         view.line("corner", Look::Truth, |row| row.of_truth(|t| t.corner_force_n)),
-        view.line("lower wall", Look::Other(palette::FLOOR), |row| {
-            row.of_truth(|t| t.floor_force_n)
-        }),
+        view.line("wall", Look::Other(palette::FLOOR), |row| row.of_truth(|t| t.floor_force_n)),
     ];
     let mut preload = view.preload();
     // The limit may be far above; it is in the plot of the run.

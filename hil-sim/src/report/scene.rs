@@ -212,7 +212,8 @@ fn values(geometry: &Geometry, row: &Tick) -> [f64; COLUMNS.len()] {
     })
 }
 
-/// About [`ROWS`] of the rows at most, dense around the crossings, the first and the last kept.
+/// About [`ROWS`] of the rows at most, dense around the crossings. The first and the last are kept,
+/// and both rows where corner or wall begins or ceases to carry.
 fn thinned<'a>(rows: &[&'a Tick], crossings: &[Event]) -> Vec<&'a Tick> {
     let near = |row: &Tick| {
         let t_s = row.controller.t_s;
@@ -228,7 +229,15 @@ fn thinned<'a>(rows: &[&'a Tick], crossings: &[Event]) -> Vec<&'a Tick> {
             Some(_) => (piece.len(), ROWS_OF_ONE.min(ROWS.0 / crossings.len())),
             None => (far, ROWS.1),
         };
-        kept.extend(piece.iter().step_by(count.div_ceil(most).max(1)));
+        let every = count.div_ceil(most).max(1);
+        let carries =
+            |row: &Tick| row.truth.map(|t| (t.corner_force_n > 0.0, t.floor_force_n > 0.0));
+        let changes = |place: usize| {
+            let near = &piece[place.saturating_sub(1)..piece.len().min(place + 2)];
+            near.iter().any(|row| carries(row) != carries(piece[place]))
+        };
+        let is_kept = |(place, _): &(usize, &&Tick)| place % every == 0 || changes(*place);
+        kept.extend(piece.iter().enumerate().filter(is_kept).map(|(_, row)| row));
     }
     if kept.last().map(|row| row.controller.tick) != rows.last().map(|row| row.controller.tick) {
         kept.extend(rows.last());
