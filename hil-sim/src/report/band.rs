@@ -5,7 +5,17 @@ use plotters::style::RGBColor;
 use super::palette;
 use super::panel::{Panel, Stretch};
 use super::panels::View;
-use crate::record::{MODE_NAMES, STAGE_NAMES, Tick};
+use crate::record::{MODE_NAMES, Tick};
+
+/// What happens in the study's stages, from number 1.
+const STAGES: [&str; 6] = [
+    "no preload",
+    "preload rises at rest",
+    "both walls carry",
+    "corner carries",
+    "onto the next wall",
+    "rolls on a wall",
+];
 
 /// One band: its name, and what a row shows in it.
 struct Lane {
@@ -28,8 +38,7 @@ fn mode(number: u8) -> (String, RGBColor) {
 
 fn stage(number: u8) -> (String, RGBColor) {
     let place = usize::from(number).wrapping_sub(1);
-    let name =
-        STAGE_NAMES.get(place).map_or_else(|| "none".to_owned(), |n| format!("{number} {n}"));
+    let name = STAGES.get(place).map_or_else(|| "none".to_owned(), |n| format!("{number} {n}"));
     (name, palette::STAGES[place % palette::STAGES.len()])
 }
 

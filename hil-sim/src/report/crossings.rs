@@ -6,10 +6,8 @@ use super::panel::{Look, Panel};
 use super::panels::{Across, View, figure};
 use crate::record::{CrossingLine, Recording};
 
-/// Shown before the corner touches, s.
-const BEFORE_S: f64 = 0.15;
-/// Shown after lift-off, s.
-const AFTER_S: f64 = 0.25;
+/// Shown before the corner touches and after lift-off, s.
+const AROUND_S: (f64, f64) = (0.15, 0.25);
 /// Size of a plot, CSS pixels.
 const SIZE: (u32, u32) = (540, 250);
 
@@ -24,7 +22,7 @@ pub(super) fn html(recording: &Recording) -> String {
 
 fn one(recording: &Recording, line: &CrossingLine) -> String {
     let mut html = format!("<h3>Crossing {}: step at {:.2} mm</h3>\n", line.index, line.step_mm);
-    let view = view(recording, line);
+    let view = view(recording, line, AROUND_S);
     if view.rows.is_empty() {
         return html + "<p>No rows were recorded around it.</p>\n";
     }
@@ -36,10 +34,14 @@ fn one(recording: &Recording, line: &CrossingLine) -> String {
     html + "</div>\n"
 }
 
-/// The rows around `line`.
-pub(super) fn view<'a>(recording: &'a Recording, line: &CrossingLine) -> View<'a> {
+/// The rows from so long before `line` until so long behind it, s.
+pub(super) fn view<'a>(
+    recording: &'a Recording,
+    line: &CrossingLine,
+    (before_s, after_s): (f64, f64),
+) -> View<'a> {
     let (first, last) = (line.touch_s.min(line.lift_s), line.touch_s.max(line.lift_s));
-    let x = (-BEFORE_S, last - first + AFTER_S);
+    let x = (-before_s, last - first + after_s);
     let rows = &recording.rows;
     let from = rows.partition_point(|row| row.controller.t_s < first + x.0);
     let to = rows.partition_point(|row| row.controller.t_s <= first + x.1).max(from);
@@ -90,7 +92,7 @@ mod tests {
     fn a_legend_names_what_its_plot_shows() {
         let recording = example::deploy();
         for (line, measured) in recording.summary.crossings.iter().zip([true, false, true]) {
-            let view = view(&recording, line);
+            let view = view(&recording, line, AROUND_S);
             let panel = &panels(&view)[2];
             let text = panel.figure("", SIZE, "");
             assert_eq!(

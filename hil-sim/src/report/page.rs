@@ -48,18 +48,20 @@ pub fn html(recording: &Recording, more: &[Section]) -> String {
     page += &section(
         "Crossings",
         &format!(
-            "{}<p class=\"note\">The gap of a crossing is the clearance between the step root \
-and the undeformed wheel at the instant at which the lower wall stops carrying load (on retraction: \
- begins to). {} A gap below the reference is safe; it costs a little time, as the plan takes the tread \
-stiffer than it is known. Speed: before lift-off, by the travel of the last half millimetre. Lead: how \
-long before the corner touched the preload was reached; negative: how long after that it was missing. \
-Slowed by: what keeps the crossing from being faster. The preload limit: all preload is used that the \
-largest one leaves, less the sensor's error and what the climb adds; the preload slew: more would take \
-longer to build than it saves.</p>\n",
+            "{}<p class=\"note\">Gap: clearance between the step's root and the undeformed wheel when \
+the lower wall stops carrying (retracting: begins to). {} Speed: mean of the axle's before that \
+instant, the last half millimetre counted most; the log's line has the tread's. Peak preload, peak \
+corner force and friction used, which is traction over normal force: the largest from the touch until \
+the wheel rolls on the next wall. Lead: how long before the touch the wanted preload was reached, \
+counted at earliest from the last lift-off; negative: how long after the touch it was missing, at \
+most until lift-off. Touch and lift-off are those that the controller sees: in a deployment it sees \
+the touch some 60 ms late. Slowed by: what keeps the crossing from being faster. Preload limit: the \
+plan uses the limit less the sensor's error and what the climb adds. Preload slew: more preload \
+would take longer to build than it saves.</p>\n",
             tables::ledger(&s.crossings),
             if s.measured {
-                "This log is a controller's: every figure is measured or estimated by it, and where \
- a step was found is compared with the step table. Slip includes creep and the steps' tolerances."
+                "Every figure of this log is measured or estimated by the controller; where a step was \
+found is compared with the step table. Slip includes creep and the steps' tolerances."
             } else {
                 "Errors are against the true value."
             }
@@ -192,7 +194,8 @@ fn plots(recording: &Recording) -> String {
 <p class=\"note\">Shaded: from the first touch of the corner (dotted) to the instant of the gap. \
 Grey line: the axle passes the face of the step. Red and amber: a fault and a limit. Time counts \
 from {zero}. The log's line of a crossing comes when the crossing is closed, behind the \
-face.{from}</p>\n\
+face. Stages 1 to 6 are the study's, as the controller sees them; its sliding, stage 4, is no \
+slip.{from}</p>\n\
 <div class=\"time\">\n{time}</div>\n<div class=\"position\">\n{position}</div>\n"
     )
 }

@@ -34,6 +34,8 @@ pub(crate) enum Look {
     Truth,
     /// Another true state of the plant.
     Other(RGBColor),
+    /// One of several runs, with the width of its line.
+    Run(RGBColor, f64),
     /// The controller's estimate: thin, above the truth.
     Estimate(RGBColor),
     /// A reference: dashed.
@@ -48,11 +50,16 @@ impl Look {
         match self {
             Self::Truth => (0, palette::TRUTH, 3.0),
             Self::Other(colour) => (1, colour, 2.0),
+            Self::Run(colour, width) => (1, colour, width),
             Self::Measured(colour) => (2, colour, 1.5),
             Self::Estimate(colour) => (3, colour, 1.5),
             Self::Wanted => (4, palette::WANTED, 1.5),
             Self::Limit => (5, palette::LIMIT, 1.2),
         }
+    }
+
+    pub(crate) fn colour(self) -> RGBColor {
+        self.style().1
     }
 
     /// Attributes of a stroke.
@@ -81,7 +88,7 @@ pub(crate) struct Line {
     pub(crate) points: Vec<(f64, f64)>,
 }
 
-/// Shape of a mark. Those of one place can be seen beside each other.
+/// Shape of a mark. At one place a ring, a square above it and a dot above both can be seen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Shape {
     Dot,
@@ -93,9 +100,9 @@ impl Shape {
     /// The strokes of a mark, from below: class, cap and width, CSS pixels.
     fn strokes(self) -> &'static [(&'static str, &'static str, f64)] {
         match self {
-            Self::Dot => &[("rim", "round", 9.0), ("mark", "round", 7.0)],
-            Self::Ring => &[("mark", "round", 15.0), ("rim", "round", 11.0)],
-            Self::Square => &[("rim", "square", 13.0), ("mark", "square", 11.0)],
+            Self::Dot => &[("rim", "round", 7.0), ("mark", "round", 5.0)],
+            Self::Ring => &[("mark", "round", 15.5), ("rim", "round", 12.5)],
+            Self::Square => &[("mark", "square", 8.5)],
         }
     }
 }
@@ -136,9 +143,9 @@ pub(crate) struct Panel {
     pub(crate) bands: Vec<(&'static str, Vec<Stretch>)>,
     /// Horizontal lines with their names.
     pub(crate) levels: Vec<(&'static str, Look, f64)>,
-    /// Spans of x that are shaded.
-    pub(crate) shades: Vec<(f64, f64)>,
-    /// Vertical lines with their names.
+    /// Spans of x that are shaded, with their names.
+    pub(crate) shades: Vec<(f64, f64, String)>,
+    /// Vertical lines with their names, if they have any.
     pub(crate) rules: Vec<Rule>,
 }
 
@@ -149,6 +156,12 @@ pub(crate) struct Rule {
     pub(crate) name: String,
     /// That of a touch of a corner, a face, a fault or a limit.
     pub(crate) colour: RGBColor,
+}
+
+impl Rule {
+    fn is_fault(&self) -> bool {
+        self.colour == palette::LIMIT
+    }
 }
 
 /// Plots over one axis, one below the other, as an SVG of this size on white, CSS pixels.
@@ -185,9 +198,10 @@ impl Panel {
             .map_or_else(String::new, |(factor, unit)| format!(" data-also=\"{factor} {unit}\""));
         let legend: String = self.legend().iter().map(Sample::html).collect();
         format!(
-            "<figure {attributes} data-x=\"{} {}\" data-y=\"{} {}\" \
+            "<figure {attributes} data-of=\"{}\" data-x=\"{} {}\" data-y=\"{} {}\" \
 data-least=\"{}\"{also}>\n<figcaption><b>{}</b><output></output>{legend}</figcaption>\n\
 <svg class=\"plot\" viewBox=\"0 0 {wide} {high}\" role=\"img\" aria-label=\"{}\">\n{}</svg></figure>\n",
+            escape(self.y_name),
             x.0,
             x.1,
             y.0,
@@ -260,9 +274,9 @@ data-least=\"{}\"{also}>\n<figcaption><b>{}</b><output></output>{legend}</figcap
         }
         let size = format!(" font-size=\"{RULE_PX}\"");
         let mut labels = String::new();
-        for (at, side, rule) in self.rule_names(x_at, wide) {
-            let more = format!("{size} fill=\"{}\"", hex(rule.colour));
-            labels += &text((at, 0.75 * RULES), side, &more, &rule.name);
+        for (at, anchor, name, colour) in self.names(x_at, wide) {
+            let more = format!("{size} fill=\"{}\"", hex(colour));
+            labels += &text((at, 0.75 * RULES), anchor, &more, name);
         }
         for (place, (_, stretches)) in self.bands.iter().enumerate() {
             for Stretch { from, to, name, .. } in stretches {
@@ -290,26 +304,40 @@ height=\"{down}\" viewBox=\"{} {} {} {}\" preserveAspectRatio=\"none\">\n\
         )
     }
 
-    /// Where the names of the rules are: touches behind the others; a name that would be on another one is left
-    /// out.
-    fn rule_names(&self, x_at: impl Fn(f64) -> f64, wide: f64) -> Vec<(f64, &'static str, &Rule)> {
+    /// Where the names of rules and shaded spans are, with their anchors. Faults choose first, then the
+    /// spans, at their middle. A rule's name is to its left where there is no room to its right; one
+    /// without room, but for a fault's, is left out.
+    fn names(&self, x_at: impl Fn(f64) -> f64, wide: f64) -> Vec<(f64, &str, &str, RGBColor)> {
+        let shown = |rule: &&Rule| (self.x.0..=self.x.1).contains(&rule.x) && !rule.name.is_empty();
+        let (faults, limits): (Vec<&Rule>, Vec<&Rule>) =
+            self.rules.iter().filter(shown).partition(|rule| rule.is_fault());
+        let beside = |rule: &&Rule| (x_at(rule.x), vec!["start", "end"], rule.colour);
+        let beside = |rule| (beside(&rule), &*rule.name);
+        let spans = self.shades.iter().filter_map(|(from, to, name)| {
+            let (from, to) = (from.max(self.x.0), to.min(self.x.1));
+            let middle = x_at(0.5 * (from + to));
+            (from < to).then_some(((middle, vec!["middle"], palette::FACE), &**name))
+        });
+        let all = faults.into_iter().map(beside).chain(spans).chain(limits.into_iter().map(beside));
         let mut taken: Vec<(f64, f64)> = Vec::new();
-        let is_touch = |rule: &&Rule| rule.colour == palette::TOUCH;
-        let rules = self.rules.iter().filter(|rule| (self.x.0..=self.x.1).contains(&rule.x));
-        let (touches, faces): (Vec<&Rule>, Vec<&Rule>) = rules.partition(is_touch);
-        let mut place = |rule: &Rule| {
-            let (x, width) = (x_at(rule.x), width(&rule.name, RULE_PX));
-            let is_left = is_touch(&rule) || x + width > wide;
-            let (at, side) = if is_left { (x - 2.0, "end") } else { (x + 2.0, "start") };
-            let from = if is_left { at - width } else { at };
-            let is_free = taken.iter().all(|other| from >= other.1 || from + width <= other.0);
-            is_free.then(|| {
-                taken.push((from, from + width));
-                (at, side)
-            })
+        let place = |((at, anchors, colour), name): ((f64, Vec<&'static str>, RGBColor), _)| {
+            let long = width(name, RULE_PX);
+            let places = anchors.into_iter().map(|anchor| match anchor {
+                "start" => (at + 2.0, anchor, at + 2.0),
+                "end" => (at - 2.0, anchor, at - 2.0 - long),
+                _ => (at, anchor, at - 0.5 * long),
+            });
+            let within: Vec<_> =
+                places.filter(|place| place.2 >= 0.0 && place.2 + long <= wide).collect();
+            let is_free =
+                |from: f64| taken.iter().all(|other| from >= other.1 || from + long <= other.0);
+            let free = within.iter().find(|place| is_free(place.2));
+            let forced = within.last().filter(|_| colour == palette::LIMIT);
+            let &(at, anchor, from) = free.or(forced)?;
+            taken.push((from - 2.0, from + long + 2.0));
+            Some((at, anchor, name, colour))
         };
-        let all = faces.into_iter().chain(touches);
-        all.filter_map(|rule| place(rule).map(|(at, side)| (at, side, rule))).collect()
+        all.filter_map(place).collect()
     }
 
     /// Everything with a place on both axes, in their units, for a plot that is `across` CSS pixels wide.
@@ -335,9 +363,9 @@ height=\"{down}\" viewBox=\"{} {} {} {}\" preserveAspectRatio=\"none\">\n\
                 high - low
             )
         };
-        for &span in &self.shades {
-            svg += &rect("shade", palette::SHADE, span, (y.0 - tall, y.1 + tall));
-            svg += "/>\n";
+        for (from, to, name) in &self.shades {
+            svg += &rect("shade", palette::SHADE, (*from, *to), (y.0 - tall, y.1 + tall));
+            svg += &format!(" data-name=\"{}\"/>\n", escape(name));
         }
         for (place, (_, stretches)) in self.bands.iter().enumerate() {
             let low = -0.92 - place as f64;
@@ -350,9 +378,10 @@ height=\"{down}\" viewBox=\"{} {} {} {}\" preserveAspectRatio=\"none\">\n\
             let d = format!("M{} {level}H{}", x.0 - long, x.1 + long);
             svg += &path("level", name, &look.stroke(), &d);
         }
-        for Rule { x: at, name, colour } in &self.rules {
-            let d = format!("M{} {}V{}", digits(*at, x), y.0 - tall, y.1 + tall);
-            svg += &path("rule", name, &stroke(*colour, 1.5), &d);
+        for rule in &self.rules {
+            let d = format!("M{} {}V{}", digits(rule.x, x), y.0 - tall, y.1 + tall);
+            let class = if rule.is_fault() { "rule fault" } else { "rule" };
+            svg += &path(class, &rule.name, &stroke(rule.colour, 1.5), &d);
         }
         let point = |&(a, b): &(f64, f64)| format!("{} {}", digits(a, x), digits(b, y));
         let mut lines: Vec<&Line> = self.lines.iter().collect();
@@ -391,7 +420,7 @@ height=\"{down}\" viewBox=\"{} {} {} {}\" preserveAspectRatio=\"none\">\n\
     }
 
     /// Vertical range of all that is shown. It begins at zero where that hides nothing.
-    fn y_range(&self) -> (f64, f64) {
+    pub(super) fn y_range(&self) -> (f64, f64) {
         if let Some(range) = self.y {
             return range;
         }
@@ -403,7 +432,7 @@ height=\"{down}\" viewBox=\"{} {} {} {}\" preserveAspectRatio=\"none\">\n\
         let range = axis::extent(shown.map(|point| point.1).chain(levels)).unwrap_or((0.0, 1.0));
         let missing = (0.5 * (self.least_span - (range.1 - range.0))).max(0.0);
         let (low, high) = axis::padded((range.0 - missing, range.1 + missing), 0.06);
-        let near_zero = (-0.02 * range.1..0.3 * range.1).contains(&range.0);
+        let near_zero = (-0.02 * range.1..=0.3 * range.1).contains(&range.0);
         (if near_zero { 0.0 } else { low }, high)
     }
 
@@ -454,5 +483,6 @@ mod tests {
         assert_eq!(range([(0.0, 8.0), (1.0, 30.0)]).0, 0.0);
         assert!(range([(0.0, 20.0), (1.0, 30.0)]).0 > 19.0);
         assert!(range([(0.0, -5.0), (1.0, 30.0)]).0 < -5.0);
+        assert_eq!(range([(0.0, 0.0), (1.0, 0.0)]).0, 0.0);
     }
 }

@@ -81,8 +81,8 @@ pub(super) struct View<'a> {
     pub(super) rows: &'a [Tick],
     pub(super) across: Across,
     pub(super) x: (f64, f64),
-    pub(super) shades: Vec<(f64, f64)>,
-    /// First touches and faces.
+    pub(super) shades: Vec<(f64, f64, String)>,
+    /// First touches, faces, faults and limits.
     pub(super) rules: Vec<Rule>,
     /// Largest preload, N, if the parameters have it.
     pub(super) limit_n: Option<f64>,
@@ -94,7 +94,7 @@ impl<'a> View<'a> {
         let rows = &recording.rows[..];
         let span = |c: &CrossingLine| {
             let (from, to) = (across.at(rows, c.touch_s), across.at(rows, c.lift_s));
-            (from.min(to), from.max(to))
+            (from.min(to), from.max(to), format!("step {}", c.index))
         };
         Self {
             recording,
@@ -193,8 +193,8 @@ impl<'a> View<'a> {
         let summary = &self.recording.summary;
         let reference_mm = Some(summary.gap_ref_mm).filter(|gap| *gap > 0.0);
         let (one, y_name) = match reference_mm {
-            Some(gap) => (gap / 100.0, "gap, % of reference"),
-            None => (1.0, "gap, mm"),
+            Some(gap) => (gap / 100.0, "clearance, % of reference"),
+            None => (1.0, "clearance, mm"),
         };
         let mut panel = self.panel("Clearance at the step root, and the gap", y_name);
         panel.also = reference_mm.map(|_| (one, "mm"));
@@ -202,10 +202,10 @@ impl<'a> View<'a> {
             self.line("clearance", Look::Truth, |row| row.of_truth(|t| t.root_clearance_mm) / one),
         ];
         panel.marks = vec![
+            self.marks("measured", (Shape::Ring, palette::GAP), |c| Some(c.gap_measured_mm? / one)),
             self.marks("predicted", (Shape::Square, palette::FLOOR), |c| {
                 Some(c.gap_predicted_mm? / one)
             }),
-            self.marks("measured", (Shape::Ring, palette::GAP), |c| Some(c.gap_measured_mm? / one)),
             self.marks("true gap", (Shape::Dot, palette::TRUTH), |c| Some(c.gap_mm / one)),
         ];
         let most = 100.0 * (1.0 + GAP_TOLERANCE);
@@ -236,15 +236,15 @@ impl<'a> View<'a> {
     }
 
     pub(super) fn slip_margin(&self) -> Panel {
-        let mut panel = self.panel("Slip margin", "friction unused, ratio");
+        let mut panel = self.panel("Slip margin", "friction left, µ - used");
         panel.least_span = 0.2;
         panel.lines = vec![
-            self.line("by the model", Look::Estimate(palette::SLIP), |row| {
-                row.controller.slip_margin
-            }),
+            self.line("planned", Look::Estimate(palette::SLIP), |row| row.controller.slip_margin),
             self.line("true", Look::Truth, |row| row.of_truth(|t| t.slip_margin_true)),
         ];
         panel.levels = vec![("slip", Look::Limit, 0.0)];
+        let (low, high) = panel.y_range();
+        panel.y = Some((low.min(-0.1), high));
         panel
     }
 
@@ -276,12 +276,6 @@ impl<'a> View<'a> {
 
 /// Where the corner first touched and where the axle passed the face.
 fn rules(rows: &[Tick], across: Across, line: &CrossingLine) -> Vec<Rule> {
-    let long = matches!(across, Across::Since(_));
-    let touch = Rule {
-        x: across.at(rows, line.touch_s),
-        name: if long { "corner touches" } else { "touch" }.to_owned(),
-        colour: palette::TOUCH,
-    };
     let from = rows.partition_point(|row| row.controller.t_s < line.touch_s.min(line.lift_s));
     let ahead = |row: &Tick| row.position_mm() < line.step_mm;
     let side = rows.get(from).map(ahead);
@@ -290,22 +284,27 @@ fn rules(rows: &[Tick], across: Across, line: &CrossingLine) -> Vec<Rule> {
         Across::Position => Some(line.step_mm),
         _ => passed.map(|row| across.of(row)),
     };
-    let name = format!("step {}", line.index);
-    let face = face_x.map(|x| Rule { x, name, colour: palette::FACE });
-    [touch].into_iter().chain(face).collect()
+    let touch = (across.at(rows, line.touch_s), palette::TOUCH);
+    let face = face_x.map(|x| (x, palette::FACE));
+    let rule = |(x, colour)| Rule { x, name: String::new(), colour };
+    [touch].into_iter().chain(face).map(rule).collect()
 }
 
-/// Faults and limits, by their codes.
+/// Faults and limits by their codes, those at one place together.
 fn reports(recording: &Recording, across: Across) -> Vec<Rule> {
     let Recording { summary, rows, .. } = recording;
-    let rule = |(report, colour): (&Report, RGBColor)| Rule {
-        x: across.at(rows, report.t_s),
-        name: report.code.to_string(),
-        colour,
-    };
     let faults = summary.faults.iter().map(|report| (report, palette::LIMIT));
     let limits = summary.limits.iter().map(|report| (report, palette::WARNING));
-    faults.chain(limits).map(rule).collect()
+    let mut rules: Vec<Rule> = Vec::new();
+    for (Report { t_s, code, .. }, colour) in faults.chain(limits) {
+        // What ended the run is reported behind its last row.
+        let x = across.at(rows, *t_s).min(across.range(rows).1);
+        match rules.iter_mut().find(|rule| (rule.x - x).abs() < 1e-9) {
+            Some(rule) => rule.name += &format!(", {code}"),
+            None => rules.push(Rule { x, name: code.to_string(), colour }),
+        }
+    }
+    rules
 }
 
 /// Speed, preload, gap and radius of a run over time from the command on, stacked, as an SVG of
@@ -349,7 +348,7 @@ mod tests {
         let position = View::new(&recording, Across::Position);
         let crossings = &recording.summary.crossings;
         for ((line, time), position) in crossings.iter().zip(&time.shades).zip(&position.shades) {
-            assert_eq!(*time, (line.touch_s, line.lift_s));
+            assert_eq!(*time, (line.touch_s, line.lift_s, format!("step {}", line.index)));
             assert!(position.0 < position.1 && position.1 < line.step_mm);
         }
     }

@@ -146,7 +146,7 @@ function start(scene) {
     set("outline", { cx: p.x, cy: -p.y });
 
     arrow("preload", [p.x, p.y + length(row.preload_n)], [p.x, p.y], row.preload_n, scene.measured ? "measured preload" : "preload");
-    label("preloadtext", p.x, p.y + length(row.preload_n) + 1, "middle", small);
+    label("preloadtext", p.x, p.y + Math.max(length(row.preload_n), r) + 1, "middle", small);
     const floor = row.floor_force_n || 0, corner = row.corner_force_n || 0;
     arrow("floor", [p.x, p.floor - length(floor)], [p.x, p.floor], row.floor_force_n, "wall");
     label("floortext", p.x - 2, p.floor - length(floor) - 1.3 * small, "end", small);

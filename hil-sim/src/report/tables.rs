@@ -31,7 +31,10 @@ pub(super) fn summary(s: &Summary) -> String {
         ("Direction", s.direction.clone()),
         ("Rig", s.rig.clone()),
         ("Seed", s.seed.to_string()),
-        ("From command to arrival", with_unit(s.duration_s, 3, "s")),
+        (
+            if s.completed { "From command to arrival" } else { "From command to end" },
+            with_unit(s.duration_s, 3, "s"),
+        ),
         ("In motion", with_unit(s.moving_s, 3, "s")),
         ("From boot to end", with_unit(s.total_s, 3, "s")),
         ("Travel", with_unit(s.travel_mm, 2, "mm")),
@@ -167,7 +170,7 @@ pub(crate) const COLUMNS: [Column; 13] = {
         new("speed", "mm/s", 2, |c| Some(c.speed_mm_s)),
         new("preload", "N", 2, |c| Some(c.preload_n)),
         Column { on_terminal: false, ..new("peak preload", "N", 2, |c| Some(c.peak_preload_n)) },
-        Column { on_terminal: false, ..new("corner", "N", 1, |c| Some(c.corner_force_n)) },
+        Column { on_terminal: false, ..new("peak corner", "N", 1, |c| Some(c.corner_force_n)) },
         Column { on_terminal: false, ..new("friction used", "", 2, |c| Some(c.peak_utilisation)) },
         new("lead", "s", 2, |c| c.lead_time_s),
         Column { on_terminal: false, ..new("slip", "mm", 2, |c| Some(c.slip_mm)) },
@@ -221,6 +224,7 @@ mod tests {
     fn what_is_not_known_is_left_out_of_the_summary() {
         let known = Summary { max_gap_mm: 2.5, ..Summary::default() };
         assert!(summary(&known).contains("<dd>2.5000 mm</dd>"), "{}", summary(&known));
+        assert!(summary(&Summary { duration_s: Some(11.0), ..known.clone() }).contains("to end<"));
         let unknown = summary(&Summary { max_gap_mm: f64::NAN, energy_j: f64::NAN, ..known });
         for part in ["Worst gap", "Drive energy", "<dd>-"] {
             assert!(!unknown.contains(part), "{part} in {unknown}");
