@@ -133,7 +133,7 @@ pub fn table(differences: &[Difference]) -> (Vec<String>, Vec<Vec<String>>) {
 }
 
 /// Size of the picture, CSS pixels: its text can still be read at 400.
-const PICTURE: (u32, u32) = (700, 860);
+const PICTURE: (u32, u32) = (700, 1000);
 /// Colours of up to three, and the widths of their lines, CSS pixels.
 const COLOURS: [(RGBColor, f64); 3] =
     [(palette::PRELOAD, 4.5), (palette::SPEED, 2.5), (palette::GAP, 1.2)];

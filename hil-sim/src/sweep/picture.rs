@@ -51,7 +51,7 @@ pub fn picture(axes: &[Axis], rows: &[Map<String, Value>], plots: &[Plot]) -> Op
         let is_none = key == "duration_s" && row["completed"] == false;
         if is_none { f64::NAN } else { number(row, key) }
     };
-    let range = axis::extent(rows.iter().map(|row| number(row, &x.key)))?;
+    let range = axis::padded(axis::extent(rows.iter().map(|row| number(row, &x.key)))?, 0.02);
     let size = (SIZE.0, SIZE.1 * plots.len() as u32);
     // The text lives as long as the process, which ends after the picture.
     let x_name: &'static str = x.key.clone().leak();
