@@ -155,7 +155,7 @@ fn panels(runs: &[(&str, &Recording)]) -> Vec<Panel> {
         all.map(|((view, (name, _)), (colour, width))| {
             let points = view.rows.iter().map(|row| (row.controller.t_s, of(row))).collect();
             // The first is the widest, so that one below another is seen.
-            Line { name: (*name).to_owned().into(), look: Look::Run(colour, width), points }
+            Line { name: (*name).to_owned().into(), look: Look::Other(colour, width), points }
         })
         .collect()
     };

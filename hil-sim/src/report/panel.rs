@@ -28,16 +28,12 @@ const GRID: &str = "#e9ebef";
 /// What a line shows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Look {
-    /// A sensor's reading: thin, above the truth.
+    /// A sensor's reading or the controller's estimate: thin, above the truth.
     Measured(RGBColor),
     /// True state of the plant: dark and wide, below the others.
     Truth,
-    /// Another true state of the plant.
-    Other(RGBColor),
-    /// One of several runs, with the width of its line.
-    Run(RGBColor, f64),
-    /// The controller's estimate: thin, above the truth.
-    Estimate(RGBColor),
+    /// Another true state of the plant, or one of several runs: with its width, CSS pixels.
+    Other(RGBColor, f64),
     /// A reference: dashed.
     Wanted,
     /// A bound: dashed, red.
@@ -49,12 +45,10 @@ impl Look {
     fn style(self) -> (u8, RGBColor, f64) {
         match self {
             Self::Truth => (0, palette::TRUTH, 3.0),
-            Self::Other(colour) => (1, colour, 2.0),
-            Self::Run(colour, width) => (1, colour, width),
+            Self::Other(colour, width) => (1, colour, width),
             Self::Measured(colour) => (2, colour, 1.5),
-            Self::Estimate(colour) => (3, colour, 1.5),
-            Self::Wanted => (4, palette::WANTED, 1.5),
-            Self::Limit => (5, palette::LIMIT, 1.2),
+            Self::Wanted => (3, palette::WANTED, 1.5),
+            Self::Limit => (4, palette::LIMIT, 1.2),
         }
     }
 
@@ -277,16 +271,6 @@ data-least=\"{}\"{also}>\n<figcaption><b>{}</b><output></output>{legend}</figcap
         for (at, anchor, name, colour) in self.names(x_at, wide) {
             let more = format!("{size} fill=\"{}\"", hex(colour));
             labels += &text((at, 0.75 * RULES), anchor, &more, name);
-        }
-        for (place, (_, stretches)) in self.bands.iter().enumerate() {
-            for Stretch { from, to, name, .. } in stretches {
-                let (from, to) = (x_at(from.max(x.0)), x_at(to.min(x.1)));
-                if width(name, RULE_PX) + 4.0 <= to - from {
-                    let at = (0.5 * (from + to), y_at(-0.5 - place as f64) + 4.0);
-                    let more = format!("{size} fill=\"#1f2937\"");
-                    labels += &text(at, "middle", &more, name);
-                }
-            }
         }
         format!(
             "<g class=\"text\" font-family=\"sans-serif\" font-size=\"{TEXT_PX}\" fill=\"#374151\">\n\

@@ -7,6 +7,7 @@ use super::palette;
 use super::panel::{Line, Look, Marks, Panel, Rule, Shape, stacked};
 use super::verdict::GAP_TOLERANCE;
 use crate::record::{CrossingLine, Recording, Report, Tick};
+use crate::scenario::Scenario;
 
 /// Size of the overview, CSS pixels.
 const OVERVIEW: (u32, u32) = (1000, 820);
@@ -92,6 +93,7 @@ impl<'a> View<'a> {
     /// All of `recording`.
     pub(super) fn new(recording: &'a Recording, across: Across) -> Self {
         let rows = &recording.rows[..];
+        let parameters = Scenario::parse("parameters", &recording.parameters, &[]);
         let span = |c: &CrossingLine| {
             let (from, to) = (across.at(rows, c.touch_s), across.at(rows, c.lift_s));
             (from.min(to), from.max(to), format!("step {}", c.index))
@@ -109,7 +111,7 @@ impl<'a> View<'a> {
                 .flat_map(|c| rules(rows, across, c))
                 .chain(reports(recording, across))
                 .collect(),
-            limit_n: parameter(&recording.parameters, "preload", "limit_n"),
+            limit_n: parameters.ok().map(|scenario| scenario.rig.preload.limit_n),
         }
     }
 
@@ -164,28 +166,24 @@ impl<'a> View<'a> {
     }
 
     pub(super) fn speed(&self) -> Panel {
-        let mut panel = self.panel("Speed", "speed, mm/s");
-        panel.least_span = 2.0;
-        panel.lines = vec![
+        let lines = vec![
             self.line("reference", Look::Wanted, |row| row.controller.speed_ref_mm_s),
-            self.line("estimated", Look::Estimate(palette::SPEED), |row| {
+            self.line("estimated", Look::Measured(palette::SPEED), |row| {
                 row.controller.wheel_speed_mm_s
             }),
             self.line("true", Look::Truth, |row| row.of_truth(|t| t.speed_true_mm_s)),
         ];
-        panel
+        Panel { least_span: 2.0, lines, ..self.panel("Speed", "speed, mm/s") }
     }
 
     pub(super) fn preload(&self) -> Panel {
-        let mut panel = self.panel("Preload", "preload, N");
-        panel.least_span = 4.0;
-        panel.lines = vec![
+        let lines = vec![
             self.line("reference", Look::Wanted, |row| row.controller.preload_ref_n),
             self.line("measured", Look::Measured(palette::PRELOAD), |row| row.controller.preload_n),
             self.line("true", Look::Truth, |row| row.of_truth(|t| t.preload_true_n)),
         ];
-        panel.levels = self.limit_n.iter().map(|&n| ("limit", Look::Limit, n)).collect();
-        panel
+        let levels = self.limit_n.iter().map(|&n| ("limit", Look::Limit, n)).collect();
+        Panel { least_span: 4.0, lines, levels, ..self.panel("Preload", "preload, N") }
     }
 
     /// The clearance as a part of the reference gap; in mm where there is none.
@@ -225,21 +223,20 @@ impl<'a> View<'a> {
     }
 
     pub(super) fn radius(&self) -> Panel {
-        let mut panel = self.panel("Radial position of the wheel centre", "radius, mm");
-        panel.lines = vec![
-            self.line("from the arm angle", Look::Estimate(palette::RADIUS), |row| {
+        let lines = vec![
+            self.line("from the arm angle", Look::Measured(palette::RADIUS), |row| {
                 row.controller.radius_mm
             }),
             self.line("true", Look::Truth, |row| row.of_truth(|t| t.radius_true_mm)),
         ];
-        panel
+        Panel { lines, ..self.panel("Radial position of the wheel centre", "radius, mm") }
     }
 
     pub(super) fn slip_margin(&self) -> Panel {
         let mut panel = self.panel("Slip margin", "friction left, µ - used");
         panel.least_span = 0.2;
         panel.lines = vec![
-            self.line("planned", Look::Estimate(palette::SLIP), |row| row.controller.slip_margin),
+            self.line("planned", Look::Measured(palette::SLIP), |row| row.controller.slip_margin),
             self.line("true", Look::Truth, |row| row.of_truth(|t| t.slip_margin_true)),
         ];
         panel.levels = vec![("slip", Look::Limit, 0.0)];
@@ -249,28 +246,24 @@ impl<'a> View<'a> {
     }
 
     pub(super) fn compression(&self) -> Panel {
-        let mut panel = self.panel("Tread compression", "compression, mm");
-        panel.least_span = 0.1;
-        panel.lines = vec![
+        let lines = vec![
             self.line("measured", Look::Measured(palette::COMPRESSION), |row| {
                 row.controller.compression_mm
             }),
             self.line("true", Look::Truth, |row| row.of_truth(|t| t.compression_true_mm)),
         ];
-        panel
+        Panel { least_span: 0.1, lines, ..self.panel("Tread compression", "compression, mm") }
     }
 
     /// What the motors are told.
     fn duty(&self) -> Panel {
-        let mut panel = self.panel("Duty of the motors", "duty, of full");
-        panel.least_span = 0.1;
-        panel.lines = vec![
+        let lines = vec![
             self.line("drive", Look::Measured(palette::SPEED), |row| row.controller.drive_duty),
             self.line("pre-tightener", Look::Measured(palette::PRELOAD), |row| {
                 row.controller.pretightener_duty
             }),
         ];
-        panel
+        Panel { least_span: 0.1, lines, ..self.panel("Duty of the motors", "duty, of full") }
     }
 }
 
@@ -315,13 +308,6 @@ pub fn overview_svg(recording: &Recording) -> String {
     stacked(OVERVIEW, &mut [view.speed(), view.preload(), view.gap(), view.radius()])
 }
 
-/// The number at `section.name` of parameters written as TOML.
-pub(super) fn parameter(parameters: &str, section: &str, name: &str) -> Option<f64> {
-    let table: toml::Table = parameters.parse().ok()?;
-    let value = table.get(section)?.get(name)?;
-    value.as_float().or_else(|| value.as_integer().map(|n| n as f64))
-}
-
 /// A plot, with what the script needs to place its cursor: axis, and time at its zero.
 pub(super) fn figure(panel: &Panel, across: Across, size: (u32, u32), name: &str) -> String {
     let axis = format!("data-across=\"{}\" data-since=\"{}\"", across.axis(), across.since_s());
@@ -332,14 +318,6 @@ pub(super) fn figure(panel: &Panel, across: Across, size: (u32, u32), name: &str
 mod tests {
     use super::*;
     use crate::report::example;
-
-    #[test]
-    fn parameters_are_found_by_section_and_name() {
-        let recording = example::deploy();
-        assert_eq!(parameter(&recording.parameters, "preload", "limit_n"), Some(50.0));
-        assert_eq!(parameter("", "preload", "limit_n"), None);
-        assert_eq!(parameter("[preload]\nlimit_n = 50", "preload", "limit_n"), Some(50.0));
-    }
 
     #[test]
     fn crossings_are_shaded_on_both_axes() {

@@ -147,41 +147,45 @@ pub(crate) struct Column {
     pub(crate) on_terminal: bool,
 }
 
-/// All of them, after the step's number.
-pub(crate) const COLUMNS: [Column; 13] = {
+impl Column {
     const fn new(
         name: &'static str,
         unit: &'static str,
         decimals: usize,
         of: fn(&CrossingLine) -> Option<f64>,
-    ) -> Column {
-        Column { name, unit, decimals, of, truth: None, on_terminal: true }
+    ) -> Self {
+        Self { name, unit, decimals, of, truth: None, on_terminal: true }
     }
-    const GAP: Option<Truth> = Some((|c| c.gap_mm, gap_error));
-    const STEP: Option<Truth> = Some((|c| c.step_mm, step_error));
-    [
-        new("gap", "mm", 3, |c| Some(c.gap_mm)),
-        Column {
-            truth: GAP,
-            on_terminal: false,
-            ..new("predicted", "mm", 3, |c| c.gap_predicted_mm)
-        },
-        Column { truth: GAP, ..new("measured", "mm", 3, |c| c.gap_measured_mm) },
-        new("speed", "mm/s", 2, |c| Some(c.speed_mm_s)),
-        new("preload", "N", 2, |c| Some(c.preload_n)),
-        Column { on_terminal: false, ..new("peak preload", "N", 2, |c| Some(c.peak_preload_n)) },
-        Column { on_terminal: false, ..new("peak corner", "N", 1, |c| Some(c.corner_force_n)) },
-        Column { on_terminal: false, ..new("friction used", "", 2, |c| Some(c.peak_utilisation)) },
-        new("lead", "s", 2, |c| c.lead_time_s),
-        Column { on_terminal: false, ..new("slip", "mm", 2, |c| Some(c.slip_mm)) },
-        new("step at", "mm", 2, |c| Some(c.step_mm)),
-        Column { truth: STEP, on_terminal: false, ..new("found at", "mm", 2, |c| c.step_found_mm) },
-        Column {
-            on_terminal: false,
-            ..new("touch to lift", "s", 3, |c| Some((c.lift_s - c.touch_s).abs()))
-        },
-    ]
-};
+
+    /// Compared with the true gap.
+    const fn of_gap(self) -> Self {
+        Self { truth: Some((|c| c.gap_mm, gap_error)), ..self }
+    }
+
+    const fn off_terminal(self) -> Self {
+        Self { on_terminal: false, ..self }
+    }
+}
+
+/// All of them, after the step's number.
+pub(crate) const COLUMNS: [Column; 13] = [
+    Column::new("gap", "mm", 3, |c| Some(c.gap_mm)),
+    Column::new("predicted", "mm", 3, |c| c.gap_predicted_mm).of_gap().off_terminal(),
+    Column::new("measured", "mm", 3, |c| c.gap_measured_mm).of_gap(),
+    Column::new("speed", "mm/s", 2, |c| Some(c.speed_mm_s)),
+    Column::new("preload", "N", 2, |c| Some(c.preload_n)),
+    Column::new("peak preload", "N", 2, |c| Some(c.peak_preload_n)).off_terminal(),
+    Column::new("peak corner", "N", 1, |c| Some(c.corner_force_n)).off_terminal(),
+    Column::new("friction used", "", 2, |c| Some(c.peak_utilisation)).off_terminal(),
+    Column::new("lead", "s", 2, |c| c.lead_time_s),
+    Column::new("slip", "mm", 2, |c| Some(c.slip_mm)).off_terminal(),
+    Column::new("step at", "mm", 2, |c| Some(c.step_mm)),
+    Column {
+        truth: Some((|c| c.step_mm, step_error)),
+        ..Column::new("found at", "mm", 2, |c| c.step_found_mm).off_terminal()
+    },
+    Column::new("touch to lift", "s", 3, |c| Some((c.lift_s - c.touch_s).abs())).off_terminal(),
+];
 
 /// What kept a crossing from being faster, in words.
 pub(crate) fn slowed_by(line: &CrossingLine) -> &'static str {

@@ -68,7 +68,7 @@ pub fn picture(axes: &[Axis], rows: &[Map<String, Value>], plots: &[Plot]) -> Op
                 own.map(|row| (number(row, &x.key), figure(row, plot.column))).collect();
             points.sort_by(|a, b| a.0.total_cmp(&b.0));
             let name = if name.is_empty() { plot.title } else { name };
-            let look = Look::Other(COLOURS[place % COLOURS.len()]);
+            let look = Look::Other(COLOURS[place % COLOURS.len()], 2.0);
             Line { name: name.to_owned().into(), look, points }
         };
         let lines: Vec<Line> = names.iter().enumerate().map(line).collect();

@@ -37,14 +37,14 @@ impl Panel {
         key.dedup_by(|a, b| a.name == b.name);
         let key = key.into_iter().map(|one| Sample {
             name: &one.name,
-            look: Some(Look::Other(one.colour)),
+            look: Some(Look::Other(one.colour, 1.0)),
             mark: Some(Shape::Square),
             has_value: false,
         });
         let marks = self.marks.iter().filter(|marks| marks.points.iter().any(is_inside));
         let marks = marks.map(|marks| Sample {
             name: &marks.name,
-            look: Some(Look::Other(marks.colour)),
+            look: Some(Look::Other(marks.colour, 1.0)),
             mark: Some(marks.shape),
             has_value: false,
         });
