@@ -48,16 +48,7 @@ pub fn html(recording: &Recording, more: &[Section]) -> String {
     page += &section(
         "Crossings",
         &format!(
-            "{}<p class=\"note\">Gap: clearance between the step's root and the undeformed wheel when \
-the lower wall stops carrying (retracting: begins to). {} Speed: mean of the axle's before that \
-instant, the last half millimetre counted most; the log's line has the tread's. Peak preload, peak \
-corner force and friction used, which is traction over normal force: the largest from the touch until \
-the wheel rolls on the next wall. Lead: how long before the touch the wanted preload was reached, \
-counted at earliest from the last lift-off; negative: how long after the touch it was missing, at \
-most until lift-off. Touch and lift-off are those that the controller sees: in a deployment it sees \
-the touch some 60 ms late. Slowed by: what keeps the crossing from being faster. Preload limit: the \
-plan uses the limit less the sensor's error and what the climb adds. Preload slew: more preload \
-would take longer to build than it saves.</p>\n",
+            include_str!("crossings.html"),
             tables::ledger(&s.crossings),
             if s.measured {
                 "Every figure of this log is measured or estimated by the controller; where a step was \
@@ -186,18 +177,7 @@ fn plots(recording: &Recording) -> String {
     });
     let commanded = s.commanded_s.is_some();
     let zero = if commanded { "the command" } else { "the start of the controller" };
-    format!(
-        "<input type=\"radio\" name=\"across\" id=\"time\" checked>\
-<label for=\"time\">over time</label>\n\
-<input type=\"radio\" name=\"across\" id=\"position\">\
-<label for=\"position\">over position</label>\n\
-<p class=\"note\">Shaded: from the first touch of the corner (dotted) to the instant of the gap. \
-Grey line: the axle passes the face of the step. Red and amber: a fault and a limit. Time counts \
-from {zero}. The log's line of a crossing comes when the crossing is closed, behind the \
-face. Stages 1 to 6 are the study's, as the controller sees them; its sliding, stage 4, is no \
-slip.{from}</p>\n\
-<div class=\"time\">\n{time}</div>\n<div class=\"position\">\n{position}</div>\n"
-    )
+    format!(include_str!("run.html"), time = time, position = position, zero = zero, from = from)
 }
 
 fn stack(recording: &Recording, across: Across) -> String {

@@ -291,37 +291,39 @@ height=\"{down}\" viewBox=\"{} {} {} {}\" preserveAspectRatio=\"none\">\n\
     /// Where the names of rules and shaded spans are, with their anchors. Faults choose first, then the
     /// spans, at their middle. A rule's name is to its left where there is no room to its right; one
     /// without room, but for a fault's, is left out.
-    fn names(&self, x_at: impl Fn(f64) -> f64, wide: f64) -> Vec<(f64, &str, &str, RGBColor)> {
+    fn names<'a>(
+        &'a self,
+        x_at: impl Fn(f64) -> f64,
+        wide: f64,
+    ) -> Vec<(f64, &'static str, &'a str, RGBColor)> {
         let shown = |rule: &&Rule| (self.x.0..=self.x.1).contains(&rule.x) && !rule.name.is_empty();
         let (faults, limits): (Vec<&Rule>, Vec<&Rule>) =
             self.rules.iter().filter(shown).partition(|rule| rule.is_fault());
-        let beside = |rule: &&Rule| (x_at(rule.x), vec!["start", "end"], rule.colour);
-        let beside = |rule| (beside(&rule), &*rule.name);
+        // Anchor, distance from the line, and the part of the name that is left of that.
+        let beside = [("start", 2.0, 0.0), ("end", -2.0, 1.0)];
+        let rule = |rule: &Rule| (x_at(rule.x), &beside[..], rule.colour);
+        let rules = |rules: Vec<&'a Rule>| rules.into_iter().map(|one| (rule(one), &*one.name));
         let spans = self.shades.iter().filter_map(|(from, to, name)| {
             let (from, to) = (from.max(self.x.0), to.min(self.x.1));
-            let middle = x_at(0.5 * (from + to));
-            (from < to).then_some(((middle, vec!["middle"], palette::FACE), &**name))
+            let at = (x_at(0.5 * (from + to)), &[("middle", 0.0, 0.5)][..], palette::FACE);
+            (from < to).then_some((at, &**name))
         });
-        let all = faults.into_iter().map(beside).chain(spans).chain(limits.into_iter().map(beside));
         let mut taken: Vec<(f64, f64)> = Vec::new();
-        let place = |((at, anchors, colour), name): ((f64, Vec<&'static str>, RGBColor), _)| {
+        let place = |((at, anchors, colour), name): ((f64, &[(&'static str, f64, f64)], _), _)| {
             let long = width(name, RULE_PX);
-            let places = anchors.into_iter().map(|anchor| match anchor {
-                "start" => (at + 2.0, anchor, at + 2.0),
-                "end" => (at - 2.0, anchor, at - 2.0 - long),
-                _ => (at, anchor, at - 0.5 * long),
-            });
-            let within: Vec<_> =
-                places.filter(|place| place.2 >= 0.0 && place.2 + long <= wide).collect();
-            let is_free =
-                |from: f64| taken.iter().all(|other| from >= other.1 || from + long <= other.0);
-            let free = within.iter().find(|place| is_free(place.2));
-            let forced = within.last().filter(|_| colour == palette::LIMIT);
-            let &(at, anchor, from) = free.or(forced)?;
-            taken.push((from - 2.0, from + long + 2.0));
-            Some((at, anchor, name, colour))
+            let from = |anchor: &(_, f64, f64)| at + anchor.1 - anchor.2 * long;
+            let within =
+                |anchor: &&(_, f64, f64)| from(anchor) >= 0.0 && from(anchor) + long <= wide;
+            let is_free = |anchor: &&(_, f64, f64)| {
+                taken.iter().all(|other| from(anchor) >= other.1 || from(anchor) + long <= other.0)
+            };
+            let mut places = anchors.iter().filter(within);
+            let forced = places.clone().next_back().filter(|_| colour == palette::LIMIT);
+            let anchor = places.find(is_free).or(forced)?;
+            taken.push((from(anchor) - 2.0, from(anchor) + long + 2.0));
+            Some((at + anchor.1, anchor.0, name, colour))
         };
-        all.filter_map(place).collect()
+        rules(faults).chain(spans).chain(rules(limits)).filter_map(place).collect()
     }
 
     /// Everything with a place on both axes, in their units, for a plot that is `across` CSS pixels wide.

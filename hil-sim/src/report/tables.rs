@@ -25,12 +25,7 @@ pub(crate) fn table(class: &str, head: &[String], rows: Vec<Vec<String>>) -> Str
 /// The summary as pairs.
 pub(super) fn summary(s: &Summary) -> String {
     let pairs = [
-        ("Completed", if s.completed { "yes" } else { "no" }.to_owned()),
-        ("Target", s.target.clone()),
-        ("Controller", s.controller.clone()),
         ("Direction", s.direction.clone()),
-        ("Rig", s.rig.clone()),
-        ("Seed", s.seed.to_string()),
         (
             if s.completed { "From command to arrival" } else { "From command to end" },
             with_unit(s.duration_s, 3, "s"),

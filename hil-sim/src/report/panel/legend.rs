@@ -51,24 +51,16 @@ impl Panel {
         lines.chain(levels).chain(bands).chain(key).chain(marks).collect()
     }
 
-    /// Title and legend and their height: the legend beside the title, or below it in as many rows as it
-    /// needs.
+    /// Title and legend and their height: the legend beside the title and in as many rows as it needs.
     pub(super) fn head(&self, wide: f64) -> (String, f64) {
-        let legend = self.legend();
-        let title = 8.0 + width(&self.title, TITLE_PX);
-        let fits = title + legend.iter().map(Sample::width).sum::<f64>() + RIGHT <= wide;
-        let (mut left, mut middle, row) = match fits {
-            true => (title, 0.5 * HEAD, HEAD),
-            false => (0.0, HEAD - 4.0 + 0.5 * LEGEND, HEAD + LEGEND),
-        };
-        let first = middle;
+        let (mut left, mut middle) = (8.0 + width(&self.title, TITLE_PX), 0.5 * HEAD);
         let mut svg = format!(
             "<g font-family=\"sans-serif\" font-size=\"{TEXT_PX}\" fill=\"#374151\">\n\
 <text x=\"8\" y=\"{}\" font-size=\"{TITLE_PX}\" fill=\"#1f2937\">{}</text>\n",
             0.5 * HEAD + 5.0,
             escape(&self.title)
         );
-        for sample in legend {
+        for sample in self.legend() {
             if left > 0.0 && left + sample.width() + RIGHT > wide {
                 (left, middle) = (0.0, middle + LEGEND);
             }
@@ -79,7 +71,7 @@ impl Panel {
             );
             left += sample.width();
         }
-        (svg + "</g>\n", row + middle - first)
+        (svg + "</g>\n", middle + 0.5 * HEAD)
     }
 }
 
