@@ -71,11 +71,10 @@ found is compared with the step table. Slip includes creep and the steps' tolera
     page += &section("Log", &folded("Lines of the log", &tables::log(&recording.log)));
     let all = format!("<pre>{}</pre>\n", escape(&recording.parameters));
     let all = folded("Parameters used, as TOML", &all);
-    page += &section("Parameters", &(tables::overrides(s) + &all));
+    page += &section("Parameters", &all);
     page += &format!(
-        "<footer>\n<p>Written by hil-sim {} with the controller interstage {}.</p>\n\
+        "<footer>\n<p>Written by interstage {}.</p>\n\
 <p>Trace digest, SHA-256: <code>{}</code></p>\n</footer>\n",
-        env!("CARGO_PKG_VERSION"),
         env!("CARGO_PKG_VERSION"),
         escape(&s.trace_digest),
     );

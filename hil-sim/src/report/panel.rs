@@ -91,13 +91,19 @@ pub(crate) enum Shape {
 }
 
 impl Shape {
-    /// The strokes of a mark, from below: class, cap and width, CSS pixels.
-    fn strokes(self) -> &'static [(&'static str, &'static str, f64)] {
-        match self {
+    /// The strokes of a mark of this colour, from below: class and attributes.
+    fn strokes(self, colour: RGBColor) -> impl Iterator<Item = (&'static str, String)> {
+        // Cap and width, CSS pixels.
+        let all: &[_] = match self {
             Self::Dot => &[("rim", "round", 7.0), ("mark", "round", 5.0)],
             Self::Ring => &[("mark", "round", 15.5), ("rim", "round", 12.5)],
             Self::Square => &[("mark", "square", 8.5)],
-        }
+        };
+        all.iter().map(move |&(class, cap, width)| {
+            let colour = if class == "rim" { "white".to_owned() } else { hex(colour) };
+            let width = format!("stroke-width=\"{width}\" stroke-linecap=\"{cap}\"");
+            (class, format!("stroke=\"{colour}\" {width}"))
+        })
     }
 }
 
@@ -158,6 +164,9 @@ impl Rule {
     }
 }
 
+/// Of a rule's name: anchor, distance from the line, and the part of the name that is left of that.
+type Anchor = (&'static str, f64, f64);
+
 /// Plots over one axis, one below the other, as an SVG of this size on white, CSS pixels.
 pub(crate) fn stacked((wide, high): (u32, u32), panels: &mut [Panel]) -> String {
     let each = (f64::from(high) - BELOW) / panels.len().max(1) as f64;
@@ -186,21 +195,15 @@ impl Panel {
     /// The plot as a figure of a page, `attributes` and its `name` for screen readers with it. Title and
     /// legend are text, so that they wrap, and have room for the values at the cursor.
     pub(crate) fn figure(&self, attributes: &str, (wide, high): (u32, u32), name: &str) -> String {
-        let (x, y) = (self.x, self.y_range());
-        let also = self
-            .also
-            .map_or_else(String::new, |(factor, unit)| format!(" data-also=\"{factor} {unit}\""));
+        let ((from, to), (low, high_y), least) = (self.x, self.y_range(), self.least_span);
+        let also = self.also.map(|(factor, unit)| format!(" data-also=\"{factor} {unit}\""));
         let legend: String = self.legend().iter().map(Sample::html).collect();
         format!(
-            "<figure {attributes} data-of=\"{}\" data-x=\"{} {}\" data-y=\"{} {}\" \
-data-least=\"{}\"{also}>\n<figcaption><b>{}</b><output></output>{legend}</figcaption>\n\
+            "<figure {attributes} data-of=\"{}\" data-x=\"{from} {to}\" data-y=\"{low} {high_y}\" \
+data-least=\"{least}\"{}>\n<figcaption><b>{}</b><output></output>{legend}</figcaption>\n\
 <svg class=\"plot\" viewBox=\"0 0 {wide} {high}\" role=\"img\" aria-label=\"{}\">\n{}</svg></figure>\n",
             escape(self.y_name),
-            x.0,
-            x.1,
-            y.0,
-            y.1,
-            self.least_span,
+            also.unwrap_or_default(),
             escape(&self.title),
             escape(name),
             self.plot((f64::from(wide), f64::from(high))),
@@ -228,21 +231,18 @@ data-least=\"{}\"{also}>\n<figcaption><b>{}</b><output></output>{legend}</figcap
         let (across, down) = (wide - LEFT - RIGHT, bottom - RULES);
         let x_at = |value: f64| LEFT + (value - x.0) / (x.1 - x.0) * across;
         let y_at = |value: f64| bottom - (value - y.0) / (y.1 - y.0) * down;
-        let text = |at: (f64, f64), anchor: &str, more: &str, text: &str| {
+        let text = |(x, y): (f64, f64), anchor: &str, more: &str, text: &str| {
+            let text = escape(text);
             format!(
-                "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"{anchor}\"{more}>{}</text>\n",
-                at.0,
-                at.1,
-                escape(text)
+                "<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\"{more}>{text}</text>\n"
             )
         };
+        let grid = |d: String| format!("<path class=\"grid\" stroke=\"{GRID}\" d=\"{d}\"/>\n");
         let mut axes = String::new();
         let (ticks, decimals) = axis::ticks(x, (wide / 75.0).max(2.0) as usize);
         for tick in ticks {
             let at = x_at(tick);
-            axes += &format!(
-                "<path class=\"grid\" stroke=\"{GRID}\" d=\"M{at:.1} {RULES}V{bottom:.1}\"/>\n"
-            );
+            axes += &grid(format!("M{at:.1} {RULES}V{bottom:.1}"));
             if self.x_name.is_some() {
                 axes += &text((at, bottom + 16.0), "middle", "", &axis::label(tick, decimals));
             }
@@ -250,10 +250,7 @@ data-least=\"{}\"{also}>\n<figcaption><b>{}</b><output></output>{legend}</figcap
         let (ticks, decimals) = axis::ticks(y, (high / 27.0).clamp(2.0, 7.0) as usize);
         for tick in ticks.into_iter().filter(|_| self.bands.is_empty()) {
             let at = y_at(tick);
-            let right = wide - RIGHT;
-            axes += &format!(
-                "<path class=\"grid\" stroke=\"{GRID}\" d=\"M{LEFT} {at:.1}H{right}\"/>\n"
-            );
+            axes += &grid(format!("M{LEFT} {at:.1}H{}", wide - RIGHT));
             axes += &text((LEFT - 6.0, at + 4.0), "end", "", &axis::label(tick, decimals));
         }
         let mut names = String::new();
@@ -299,8 +296,7 @@ height=\"{down}\" viewBox=\"{} {} {} {}\" preserveAspectRatio=\"none\">\n\
         let shown = |rule: &&Rule| (self.x.0..=self.x.1).contains(&rule.x) && !rule.name.is_empty();
         let (faults, limits): (Vec<&Rule>, Vec<&Rule>) =
             self.rules.iter().filter(shown).partition(|rule| rule.is_fault());
-        // Anchor, distance from the line, and the part of the name that is left of that.
-        let beside = [("start", 2.0, 0.0), ("end", -2.0, 1.0)];
+        let beside: [Anchor; 2] = [("start", 2.0, 0.0), ("end", -2.0, 1.0)];
         let rule = |rule: &Rule| (x_at(rule.x), &beside[..], rule.colour);
         let rules = |rules: Vec<&'a Rule>| rules.into_iter().map(|one| (rule(one), &*one.name));
         let spans = self.shades.iter().filter_map(|(from, to, name)| {
@@ -309,12 +305,11 @@ height=\"{down}\" viewBox=\"{} {} {} {}\" preserveAspectRatio=\"none\">\n\
             (from < to).then_some((at, &**name))
         });
         let mut taken: Vec<(f64, f64)> = Vec::new();
-        let place = |((at, anchors, colour), name): ((f64, &[(&'static str, f64, f64)], _), _)| {
+        let place = |((at, anchors, colour), name): ((f64, &[Anchor], _), _)| {
             let long = width(name, RULE_PX);
-            let from = |anchor: &(_, f64, f64)| at + anchor.1 - anchor.2 * long;
-            let within =
-                |anchor: &&(_, f64, f64)| from(anchor) >= 0.0 && from(anchor) + long <= wide;
-            let is_free = |anchor: &&(_, f64, f64)| {
+            let from = |anchor: &Anchor| at + anchor.1 - anchor.2 * long;
+            let within = |anchor: &&Anchor| from(anchor) >= 0.0 && from(anchor) + long <= wide;
+            let is_free = |anchor: &&Anchor| {
                 taken.iter().all(|other| from(anchor) >= other.1 || from(anchor) + long <= other.0)
             };
             let mut places = anchors.iter().filter(within);
@@ -336,28 +331,22 @@ height=\"{down}\" viewBox=\"{} {} {} {}\" preserveAspectRatio=\"none\">\n\
             format!("<path class=\"{class}\" data-name=\"{name}\" {stroke} d=\"{d}\"/>\n")
         };
         let mut svg = String::new();
-        let rect = |class: &str,
-                    colour: RGBColor,
-                    (from, to): (f64, f64),
-                    (low, high): (f64, f64)| {
+        let rect = |class: &str, colour, span: (f64, f64), (low, high): (f64, f64), name: &str| {
+            let (from, wide) = (digits(span.0, x), digits(span.1 - span.0, x).max(0.0));
+            let (fill, name, high) = (hex(colour), escape(name), high - low);
             format!(
-                "<rect class=\"{class}\" fill=\"{}\" x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\"",
-                hex(colour),
-                digits(from, x),
-                low,
-                digits(to - from, x).max(0.0),
-                high - low
+                "<rect class=\"{class}\" data-name=\"{name}\" fill=\"{fill}\" x=\"{from}\" \
+y=\"{low}\" width=\"{wide}\" height=\"{high}\"/>\n"
             )
         };
         for (from, to, name) in &self.shades {
-            svg += &rect("shade", palette::SHADE, (*from, *to), (y.0 - tall, y.1 + tall));
-            svg += &format!(" data-name=\"{}\"/>\n", escape(name));
+            let all = (y.0 - tall, y.1 + tall);
+            svg += &rect("shade", palette::SHADE, (*from, *to), all, name);
         }
         for (place, (_, stretches)) in self.bands.iter().enumerate() {
             let low = -0.92 - place as f64;
             for Stretch { from, to, name, colour } in stretches {
-                svg += &rect("band", *colour, (*from, *to), (low, low + 0.84));
-                svg += &format!(" data-name=\"{}\"/>\n", escape(name));
+                svg += &rect("band", *colour, (*from, *to), (low, low + 0.84), name);
             }
         }
         for &(name, look, level) in &self.levels {
@@ -394,11 +383,7 @@ height=\"{down}\" viewBox=\"{} {} {} {}\" preserveAspectRatio=\"none\">\n\
         for Marks { name, shape, colour, points } in &self.marks {
             let points = points.iter().filter(|point| point.0.is_finite() && point.1.is_finite());
             let d: String = points.map(|at| format!("M{}h0", point(at))).collect();
-            for (class, cap, width) in shape.strokes() {
-                let colour = if *class == "rim" { "white".to_owned() } else { hex(*colour) };
-                let stroke = format!(
-                    "stroke=\"{colour}\" stroke-width=\"{width}\" stroke-linecap=\"{cap}\""
-                );
+            for (class, stroke) in shape.strokes(*colour) {
                 svg += &path(class, name, &stroke, &d);
             }
         }

@@ -2,11 +2,9 @@
 //! comparison.
 
 use interstage::model::LimitedBy;
-use serde_json::Value;
 
 use super::svg::escape;
 use crate::record::{CrossingLine, LogLine, Report, Summary};
-use crate::scenario::brief;
 use crate::table::{number, signed};
 
 /// A table as HTML, without a head if that is empty; the cells are HTML already.
@@ -42,10 +40,6 @@ pub(super) fn summary(s: &Summary) -> String {
         ("Mean preload", with_unit(s.mean_preload_n, 2, "N")),
         ("Drive energy", with_unit(s.energy_j, 3, "J")),
         ("Friction work", with_unit(s.friction_work_j, 3, "J")),
-        (
-            "Real-time factor",
-            if s.measured { String::new() } else { number(s.real_time_factor, 1) },
-        ),
     ];
     let cells: String = pairs
         .iter()
@@ -107,16 +101,6 @@ pub(super) fn reports(s: &Summary) -> String {
         ]
     });
     injected + &table("lines", &[], rows.collect())
-}
-
-/// The parameters that differ from the preset's.
-pub(super) fn overrides(s: &Summary) -> String {
-    if s.overrides.is_empty() {
-        return "<p>Every parameter is the preset's.</p>\n".to_owned();
-    }
-    let row = |(key, value): (&String, &Value)| vec![escape(key), escape(&brief(value))];
-    "<p>Different from the preset:</p>\n".to_owned()
-        + &table("lines", &[], s.overrides.iter().map(row).collect())
 }
 
 pub(super) fn log(lines: &[LogLine]) -> String {

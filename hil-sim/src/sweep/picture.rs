@@ -42,7 +42,6 @@ pub fn picture(axes: &[Axis], rows: &[Map<String, Value>], plots: &[Plot]) -> Op
         parts.collect::<Vec<_>>().join(", ")
     };
     let mut names: Vec<String> = rows.iter().map(group).collect();
-    names.dedup();
     let mut seen = std::collections::HashSet::new();
     names.retain(|name| seen.insert(name.clone()));
     let number = |row: &Map<String, Value>, key: &str| row[key].as_f64().unwrap_or(f64::NAN);

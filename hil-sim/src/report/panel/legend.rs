@@ -1,7 +1,7 @@
 //! Title and legend of a plot: in its picture, or as text of a page.
 
 use super::super::axis::TEXT_PX;
-use super::super::svg::{escape, hex, width};
+use super::super::svg::{escape, width};
 use super::{Line, Look, Panel, RIGHT, Shape, Stretch};
 
 /// Heights of the title and of a legend below it, in a picture that is no page's.
@@ -97,14 +97,11 @@ impl Sample<'_> {
             let class = if look == Look::Truth { " class=\"truth\"" } else { "" };
             return format!("<path{class} {} d=\"M{left} 0h{length}\"/>", look.stroke());
         };
-        let one = |&(class, cap, width): &(&str, &str, f64)| {
-            let colour = if class == "rim" { "white".to_owned() } else { hex(look.style().1) };
-            format!(
-                "<path class=\"{class}\" stroke=\"{colour}\" stroke-width=\"{width}\" stroke-linecap=\"{cap}\" d=\"M{} 0h0\"/>",
-                left + 0.5 * length
-            )
-        };
-        shape.strokes().iter().map(one).collect()
+        let middle = left + 0.5 * length;
+        let strokes = shape.strokes(look.colour());
+        let one =
+            |(class, stroke)| format!("<path class=\"{class}\" {stroke} d=\"M{middle} 0h0\"/>");
+        strokes.map(one).collect()
     }
 
     /// The entry as text of a page, with room for the value at the cursor.
