@@ -134,9 +134,12 @@ pub fn table(differences: &[Difference]) -> (Vec<String>, Vec<Vec<String>>) {
 
 /// Size of the picture, CSS pixels: its text can still be read at 400.
 const PICTURE: (u32, u32) = (700, 1000);
-/// Colours of up to three, and the widths of their lines, CSS pixels.
-const COLOURS: [(RGBColor, f64); 3] =
-    [(palette::PRELOAD, 4.5), (palette::SPEED, 2.5), (palette::GAP, 1.2)];
+/// Colours of up to three, widths of their lines, CSS pixels, and marks: all are seen at one place.
+const LOOKS: [(RGBColor, f64, Shape); 3] = [
+    (palette::PRELOAD, 4.5, Shape::Ring),
+    (palette::SPEED, 2.5, Shape::Square),
+    (palette::GAP, 1.2, Shape::Dot),
+];
 
 /// The picture of up to three runs with their names: preload, position, slip and gap.
 pub fn beside_svg(runs: &[(String, &Recording)]) -> String {
@@ -151,10 +154,9 @@ fn panels(runs: &[(&str, &Recording)]) -> Vec<Panel> {
     let ends = views.iter().map(|view| view.x);
     let x = ends.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1))).unwrap_or_default();
     let line = |of: &dyn Fn(&Tick) -> f64| -> Vec<Line> {
-        let all = views.iter().zip(runs).zip(COLOURS);
-        all.map(|((view, (name, _)), (colour, width))| {
+        let all = views.iter().zip(runs).zip(LOOKS);
+        all.map(|((view, (name, _)), (colour, width, _))| {
             let points = view.rows.iter().map(|row| (row.controller.t_s, of(row))).collect();
-            // The first is the widest, so that one below another is seen.
             Line { name: (*name).to_owned().into(), look: Look::Other(colour, width), points }
         })
         .collect()
@@ -184,9 +186,8 @@ fn panels(runs: &[(&str, &Recording)]) -> Vec<Panel> {
     let mut slip = panel("Gross slip of the wheel", "slip, mm", &|row| row.of_truth(|t| t.slip_mm));
     slip.least_span = 2.0;
     let without = views.iter().find(|view| view.recording.summary.gap_ref_mm <= 0.0);
-    let mut gap = without.unwrap_or(&views[0]).gap();
-    gap.title = "Gap at the steps".to_owned();
-    let all = [preload, speed, position, slip, own_gaps(&views, runs, Panel { x, ..gap })];
+    let gap = Panel { x, ..without.unwrap_or(&views[0]).gap() };
+    let all = [preload, speed, position, slip, own_gaps(&views, runs, gap)];
     all.into_iter().filter(Panel::has_data).collect()
 }
 
@@ -194,9 +195,10 @@ fn panels(runs: &[(&str, &Recording)]) -> Vec<Panel> {
 fn own_gaps(views: &[View<'_>], runs: &[(&str, &Recording)], mut panel: Panel) -> Panel {
     let is_relative = panel.also.take().is_some();
     panel.y_name = if is_relative { "gap, % of reference" } else { "gap, mm" };
-    let all = views.iter().zip(runs).zip(COLOURS);
+    panel.title = "Gap at the steps".to_owned();
+    let all = views.iter().zip(runs).zip(LOOKS);
     panel.marks = all
-        .map(|((view, (name, _)), (colour, _))| {
+        .map(|((view, (name, _)), (colour, _, shape))| {
             let summary = &view.recording.summary;
             let one = if is_relative { summary.gap_ref_mm / 100.0 } else { 1.0 };
             let own = |line: &CrossingLine| {
@@ -204,7 +206,7 @@ fn own_gaps(views: &[View<'_>], runs: &[(&str, &Recording)], mut panel: Panel) -
                 Some((line.lift_s, gap.or(line.gap_measured_mm)? / one))
             };
             let points = summary.crossings.iter().filter_map(own).collect();
-            Marks { name: (*name).to_owned().into(), shape: Shape::Dot, colour, points }
+            Marks { name: (*name).to_owned().into(), shape, colour, points }
         })
         .collect();
     (panel.lines, panel.shades, panel.rules) = Default::default();

@@ -285,9 +285,8 @@ height=\"{down}\" viewBox=\"{} {} {} {}\" preserveAspectRatio=\"none\">\n\
         )
     }
 
-    /// Where the names of rules and shaded spans are, with their anchors. Faults choose first, then the
-    /// spans, at their middle. A rule's name is to its left where there is no room to its right; one
-    /// without room, but for a fault's, is left out.
+    /// Places, anchors, names and colours for rules and shaded spans. Faults choose first, then spans. A
+    /// name without room to the right of its rule is to the left, else left out unless a fault's.
     fn names<'a>(
         &'a self,
         x_at: impl Fn(f64) -> f64,
