@@ -22,22 +22,25 @@ const CELL_PX: f64 = 11.0;
 
 /// The picture as SVG.
 pub fn picture(envelope: &Envelope) -> String {
+    let has_numbers = envelope.frictions.len() <= 10 && envelope.loads_n.len() <= 12;
     svg::fixed(SIZE, |area| {
         let (head, maps) = area.split_vertically(LEGEND);
-        legend(&head)?;
+        legend(&head, has_numbers)?;
         let places = STRATEGIES.into_iter().flat_map(|kind| [true, false].map(|k| (k, kind)));
         for (area, (known, kind)) in maps.split_evenly((STRATEGIES.len(), 2)).iter().zip(places) {
-            map(envelope, area, known, kind)?;
+            map(envelope, area, (known, kind), has_numbers)?;
         }
         Ok(())
     })
 }
 
 /// What the colours say.
-fn legend(head: &Area) -> Drawn {
+fn legend(head: &Area, has_numbers: bool) -> Drawn {
+    let seconds = if has_numbers { "; seconds from the command" } else { "" };
+    let good = format!("completes without slip, in % of the grid{seconds}");
     let style = || font(axis::TEXT_PX, palette::TEXT, HPos::Left, VPos::Center);
     for (colour, text, (left, middle)) in [
-        (palette::OUTCOMES[0], "completes without slip: seconds from the command", (14, 15)),
+        (palette::OUTCOMES[0], &*good, (14, 15)),
         (palette::OUTCOMES[1], "completes, but slips", (14, 37)),
         (palette::OUTCOMES[2], "does not complete", (234, 37)),
     ] {
@@ -45,7 +48,7 @@ fn legend(head: &Area) -> Drawn {
         head.draw(&Rectangle::new(box_, colour.filled()))?;
         head.draw(&Text::new(text, ((left + 24) * S, middle * S), style()))?;
     }
-    head.draw(&Circle::new((442 * S, 37 * S), 5 * S, palette::TRUTH.stroke_width(3)))?;
+    head.draw(&Circle::new((442 * S, 37 * S), 3 * S, palette::TRUTH.stroke_width(3)))?;
     head.draw(&Text::new("nominal", (454 * S, 37 * S), style()))
 }
 
@@ -54,12 +57,26 @@ fn half(values: &[f64]) -> f64 {
     0.5 * (values[values.len() - 1] - values[0]) / (values.len() - 1) as f64
 }
 
+/// How many decimals show every value; at most three.
+fn decimals(values: &[f64]) -> usize {
+    let shows = |n: &usize| {
+        let scale = 10_f64.powi(*n as i32);
+        values.iter().all(|value| ((value * scale).round() / scale - value).abs() < 1e-6)
+    };
+    (0..3).find(shows).unwrap_or(3)
+}
+
 /// The map of one strategy.
-fn map(envelope: &Envelope, area: &Area, known: bool, controller: ControllerKind) -> Drawn {
+fn map(
+    envelope: &Envelope,
+    area: &Area,
+    (known, controller): (bool, ControllerKind),
+    has_numbers: bool,
+) -> Drawn {
     let (head, body) = area.split_vertically(HEAD);
     let part = envelope.area(controller);
     let (what, part) = if known { ("known", part.known) } else { ("unknown", part.unknown) };
-    let title = format!("{}, {what}: {:.0} %", controller.name(), 100.0 * part);
+    let title = format!("{}, {what}: {:.0} % of the grid", controller.name(), 100.0 * part);
     let style = font(13.0, palette::TRUTH, HPos::Left, VPos::Center);
     head.draw(&Text::new(title, (46 * S, HEAD / 2), style))?;
     let (frictions, loads) = (&envelope.frictions, &envelope.loads_n);
@@ -78,8 +95,8 @@ fn map(envelope: &Envelope, area: &Area, known: bool, controller: ControllerKind
         .y_label_area_size(42 * S)
         .build_cartesian_2d(Scale::new(x, ticks(frictions)), Scale::new(y, ticks(loads)))?;
     axis::plain(&mut chart.configure_mesh())
-        .x_label_formatter(&|x| label(*x, 1))
-        .y_label_formatter(&|y| label(*y, 0))
+        .x_label_formatter(&|x| label(*x, decimals(frictions)))
+        .y_label_formatter(&|y| label(*y, decimals(loads)))
         .x_desc("friction")
         .y_desc("load, N")
         .draw()?;
@@ -93,13 +110,13 @@ fn map(envelope: &Envelope, area: &Area, known: bool, controller: ControllerKind
         };
         let corners = [(fx - dx, fy - dy), (fx + dx, fy + dy)];
         chart.draw_series([Rectangle::new(corners, colour.filled())])?;
-        if let Some(seconds) = text.filter(|_| frictions.len() <= 10 && loads.len() <= 12) {
+        if let Some(seconds) = text.filter(|_| has_numbers) {
             let style = font(CELL_PX, palette::TEXT, HPos::Center, VPos::Center);
             let text = Text::new(label(seconds, 1), (0, 0), style);
             chart.draw_series([EmptyElement::at((fx, fy)) + text])?;
         }
     }
-    let ring = Circle::new(envelope.nominal, 9 * S, palette::TRUTH.stroke_width(3));
+    let ring = Circle::new(envelope.nominal, 3 * S, palette::TRUTH.stroke_width(3));
     let (friction, load) = envelope.nominal;
     let inside = (x.0..=x.1).contains(&friction) && (y.0..=y.1).contains(&load);
     chart.draw_series(inside.then_some(ring))?;

@@ -18,8 +18,9 @@ pub fn svg(rows: &[&Residuals]) -> String {
             "{}, {}: rms {:.2e} {}, {} values, {:.0} of them independent",
             row.log, row.channel, row.rms, row.unit, row.count, row.independent
         ),
-        y_name: row.unit,
-        x_name: Some("time, s"),
+        // The text lives as long as the process, which ends after the picture.
+        y_name: format!("{} residual, {}", row.channel, row.unit).leak(),
+        x_name: Some("time from boot, s"),
         x,
         marks: vec![Marks {
             name: row.channel.into(),
@@ -60,6 +61,6 @@ mod tests {
         assert_eq!(svg.matches("h0\"/>").count(), 2 * (2 + 2));
         assert_eq!(svg.matches("h0M").count(), 2 * 2 * 2);
         assert!(svg.contains("a.csv, compression: rms 1.00e-1 mm, 3 values"), "{svg}");
-        assert!(svg.contains("time, s"));
+        assert!(svg.contains("time from boot, s") && svg.contains("compression residual, mm"));
     }
 }

@@ -382,7 +382,7 @@ mod tests {
         assert_eq!(cut_off(119_999).cut_off_s, None);
         assert_eq!(cut_off(120_000).cut_off_s, Some(120.0));
         let said = crate::report::verdict::headline(&cut_off(120_000));
-        assert!(said.starts_with("Did not complete within 120 s: "), "{said}");
+        assert!(said.starts_with("Did not complete: time-out at 120 s from boot after "), "{said}");
     }
 
     #[test]

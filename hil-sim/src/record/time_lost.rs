@@ -12,40 +12,47 @@ pub struct TimeLost {
     /// Nothing lost: the travel, at cruise speed.
     #[serde(default)]
     pub cruise_s: f64,
-    /// At rest, until the preload carries the wheel.
+    /// At rest, until the first preload suffices.
     pub preload_s: f64,
     /// Before the steps: acceleration at the start, waiting for the preload, the window in which
     /// the step may come.
     pub approach_s: f64,
-    /// On the corners, and until the wheel is fast again behind them.
+    /// From the touch until the wheel is fast again.
     pub crossing_s: f64,
     /// Behind the last step: braking for the end of travel.
     pub end_s: f64,
 }
 
 impl TimeLost {
-    /// The largest part, in words.
-    pub(crate) fn main(&self) -> String {
-        let parts = [
-            (self.preload_s, "the wheel waits for the first preload"),
-            (self.approach_s, "it is slow or waits before the steps"),
-            (self.crossing_s, "it is slow on the steps"),
-            (self.end_s, "it is slow behind the last step"),
-        ];
-        let most = parts.into_iter().max_by(|a, b| a.0.total_cmp(&b.0));
-        most.map_or_else(String::new, |(s, what)| format!("{what} ({s:.2} s)"))
+    /// The parts beside the travel, with what each is.
+    fn parts(&self) -> [(f64, &'static str); 4] {
+        [
+            (self.preload_s, "until the first preload suffices"),
+            (self.approach_s, "before the steps"),
+            (self.crossing_s, "from the touch until the wheel is fast again"),
+            (self.end_s, "behind the last step"),
+        ]
     }
 
-    /// Each part to a millisecond, and the sum of the printed parts.
+    /// The largest part beside the travel, in words.
+    pub(crate) fn main(&self) -> String {
+        let most = self.parts().into_iter().max_by(|a, b| a.0.total_cmp(&b.0));
+        most.map_or_else(String::new, |(s, what)| format!("{s:.2} s {what}"))
+    }
+
+    /// Each part to a millisecond, and their sum. The travel takes the rounding, so that the printed
+    /// parts add up.
     pub fn sentence(&self) -> String {
-        let parts_s = [self.cruise_s, self.preload_s, self.approach_s, self.crossing_s, self.end_s];
-        let parts_s = parts_s.map(|s| (s * 1e3).round() / 1e3);
-        let sum = number(parts_s.iter().sum::<f64>(), 3);
-        let [cruise, preload, approach, crossing, end] = parts_s.map(|s| number(s, 3));
+        let round = |s: f64| (s * 1e3).round() / 1e3;
+        let parts = self.parts().map(|part| round(part.0));
+        let sum_s = round(self.cruise_s + self.parts().iter().map(|part| part.0).sum::<f64>());
+        let cruise = number(sum_s - parts.iter().sum::<f64>(), 3);
+        let [preload, approach, crossing, end] = parts.map(|s| number(s, 3));
+        let [first, before, corner, last] = self.parts().map(|part| part.1);
         format!(
-            "{sum} s = {cruise} s for the travel at cruise speed + {preload} s until the preload \
-             carries the wheel + lost by going slower: {approach} s before the steps + \
-             {crossing} s on them + {end} s behind the last"
+            "{} s = {cruise} s for the travel at cruise speed + {preload} s {first} + lost by going \
+             slower: {approach} s {before} + {crossing} s {corner} + {end} s {last}",
+            number(sum_s, 3)
         )
     }
 }
@@ -89,7 +96,8 @@ impl TimeSplit {
         match before {
             PRELOADS if !self.moved => self.preload.add(part),
             _ if !self.moved => self.preload = Part::default(),
-            _ if !MOVES.contains(&before) => {}
+            // The motion ends with the last tick in which it moves.
+            _ if !(MOVES.contains(&before) && MOVES.contains(&mode)) => {}
             _ if CROSSES.contains(&before) => {
                 self.approach.add(std::mem::take(&mut self.open));
                 self.crossing.add(part);
@@ -130,7 +138,7 @@ mod tests {
             (5, 1, 10.0),
             (6, 1, 5.0),
             (7, 1, 5.0),
-            (5, 2, 2.5),
+            (5, 3, 2.5),
             (10, 7, 0.0),
         ];
         let (mut split, mut t_s, mut position_mm) = (TimeSplit::default(), 0.0, 80.0);
@@ -141,22 +149,15 @@ mod tests {
             }
         }
         let lost = split.lost(10.0);
-        let expected = TimeLost {
-            cruise_s: 7.3,
-            preload_s: 3.0,
-            approach_s: 1.5,
-            crossing_s: 3.2 + 0.5,
-            end_s: 1.5,
-        };
         assert!(lost.sentence().starts_with("17.000 s = 7.300 s for the travel"), "{lost:?}");
-        for (got, wanted) in [
-            (lost.cruise_s, expected.cruise_s),
-            (lost.preload_s, expected.preload_s),
-            (lost.approach_s, expected.approach_s),
-            (lost.crossing_s, expected.crossing_s),
-            (lost.end_s, expected.end_s),
-        ] {
-            assert!((got - wanted).abs() < 1e-9, "{lost:?} {expected:?}");
+        assert_eq!(lost.main(), "3.70 s from the touch until the wheel is fast again");
+        let run = crate::report::example::deploy().summary;
+        let (lost_by_run, duration_s) = (run.lost.unwrap(), run.duration_s.unwrap());
+        assert!(lost_by_run.sentence().starts_with(&format!("{duration_s:.3} s = ")));
+        let parts = lost.parts().map(|part| part.0);
+        for (got, wanted) in parts.into_iter().chain([lost.cruise_s]).zip([3.0, 1.5, 3.7, 1.5, 7.3])
+        {
+            assert!((got - wanted).abs() < 1e-9, "{lost:?}");
         }
     }
 }

@@ -11,12 +11,12 @@ use super::verdict::origin;
 use crate::record::Recording;
 
 /// Size of the picture, CSS pixels.
-const SIZE: (f64, f64) = (640.0, 590.0);
+const SIZE: (f64, f64) = (640.0, 645.0);
 /// Where the pictures of wheel and corner are, and where the plots begin, with their heights.
 const WHEEL: &str = "y=\"40\" width=\"390\" height=\"300\" viewBox=\"-50 -54 80.6 62\"";
 const CORNER: &str = "x=\"400\" y=\"40\" width=\"240\" height=\"300\" viewBox=\"-11 -15 16 20\"";
 const PLOTS: f64 = 345.0;
-const PLOT: [f64; 2] = [105.0, 140.0];
+const PLOT: [f64; 2] = [135.0, 165.0];
 /// Shown around the first touch and lift-off, s.
 const AROUND_S: (f64, f64) = (0.45, 0.75);
 /// How many times slower than the run, and how long it stops at lift-off, s.
@@ -75,26 +75,32 @@ pub fn animated_svg(recording: &Recording) -> Option<String> {
     };
     let gap_x = animate("animate attributeName=\"x2\"", &|t| format!("{:.3}", rim(t).0));
     let gap_y = animate("animate attributeName=\"y2\"", &|t| format!("{:.3}", rim(t).1));
-    let mut words = String::new();
+    let (mut words, mut named) = (String::new(), String::new());
     let reference = format!("gap {:.2} mm, reference {:.2} mm", c.gap_mm, scene.gap_ref_mm);
     let carries = if scene.retracts { "the lower wall carries" } else { "lift-off" };
+    let shown = |since: f64, until: f64| {
+        animate("animate attributeName=\"opacity\" calcMode=\"discrete\"", &|t| {
+            u8::from((since..until).contains(&t)).to_string()
+        })
+    };
     for (text, since, until) in [
         ("It slows before the step; the preload has been raised".to_owned(), f64::MIN, first),
         ("The corner takes over the load".to_owned(), first, last),
         (format!("Step {}, {carries}: {reference}", c.index), last, f64::MAX),
     ] {
-        let opacity = animate("animate attributeName=\"opacity\" calcMode=\"discrete\"", &|t| {
-            u8::from((since..until).contains(&t)).to_string()
-        });
+        let opacity = shown(since, until);
         let _ = writeln!(
             words,
             "<text x=\"20\" y=\"27\" font-size=\"17\" opacity=\"0\">{text}{opacity}</text>"
         );
     }
-    let view = view(recording, line);
+    for (name, since, until) in [("clearance", f64::MIN, last), ("gap", last, f64::MAX)] {
+        let opacity = shown(since, until);
+        let _ = write!(named, "<text x=\"0.4\" y=\"1.2\" opacity=\"0\">{name}{opacity}</text>");
+    }
+    let view = view(recording, line, AROUND_S);
     let (mut plots, mut down) = (String::new(), PLOTS);
     for (mut panel, high) in [view.preload(), view.gap()].into_iter().zip(PLOT) {
-        panel.x = (from - first, to - first);
         panel.title.truncate("Clearance".len());
         // As much as fits its height.
         panel.y_name = panel.y_name.trim_end_matches(" of reference");
@@ -131,7 +137,7 @@ font-family=\"sans-serif\" fill=\"#1f2937\">\n<title>A crossing of a simulated r
 <g stroke=\"{preload}\" stroke-width=\"1\" fill=\"none\"><line y2=\"0\">{tail}</line><path d=\"M-1.4 -2.4L0 0L1.4 -2.4\"/></g>\
 <text x=\"2\" y=\"-5\" font-size=\"3\">preload</text></g></svg>\n\
 <svg {CORNER}><rect x=\"-11\" y=\"-15\" width=\"16\" height=\"20\" fill=\"#f4f5f7\"/><use href=\"#crossing\"/>\
-<g font-size=\"0.95\"><text x=\"0.4\" y=\"1.2\" fill=\"{gap}\">gap</text>\
+<g font-size=\"0.95\"><g fill=\"{gap}\">{named}</g>\
 <text x=\"-3\" y=\"1.3\" text-anchor=\"end\" fill=\"#287c3c\">reference gap</text></g></svg>\n\
 {words}{plots}</svg>\n",
         SIZE.0,

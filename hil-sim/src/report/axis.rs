@@ -113,7 +113,9 @@ mod tests {
     }
 
     #[test]
-    fn a_range_is_never_empty() {
+    fn a_range_is_never_empty_and_skips_what_is_not_a_number() {
+        assert_eq!(extent([f64::NAN, 2.0, -1.0, f64::INFINITY]), Some((-1.0, 2.0)));
+        assert_eq!(extent([f64::NAN]), None);
         let (low, high) = padded((33.3, 33.3), 0.1);
         assert!(high > low);
         assert_eq!(padded((0.0, 10.0), 0.1), (-1.0, 11.0));
@@ -123,11 +125,5 @@ mod tests {
     fn zero_has_no_sign() {
         assert_eq!(label(-0.001, 1), "0.0");
         assert_eq!(label(-0.2, 1), "-0.2");
-    }
-
-    #[test]
-    fn extent_skips_what_is_not_a_number() {
-        assert_eq!(extent([f64::NAN, 2.0, -1.0, f64::INFINITY]), Some((-1.0, 2.0)));
-        assert_eq!(extent([f64::NAN]), None);
     }
 }

@@ -1,59 +1,62 @@
 //! Mode, contact stage and sleeve level as three bands on the axis of the plots.
 
-use plotters::style::RGBColor;
-
 use super::palette;
 use super::panel::{Panel, Stretch};
 use super::panels::View;
-use crate::record::{MODE_NAMES, STAGE_NAMES, Tick};
+use crate::record::{MODE_NAMES, Tick};
 
-/// One band: its name, and what a row shows in it.
+/// What happens in the study's stages, from number 1.
+const STAGES: [&str; 6] = [
+    "no preload",
+    "preload rises at rest",
+    "both walls carry",
+    "corner carries",
+    "onto the next wall",
+    "rolls on a wall",
+];
+
+/// One band: its name, what a row shows in it, in words, and the colours by number.
 struct Lane {
     name: &'static str,
     of: fn(&Tick) -> u8,
-    show: fn(u8) -> (String, RGBColor),
+    show: fn(u8) -> String,
+    colours: &'static [u32],
 }
 
 const LANES: [Lane; 3] = [
-    Lane { name: "mode", of: |row| row.controller.mode, show: mode },
-    Lane { name: "stage", of: |row| row.controller.stage, show: stage },
-    Lane { name: "level", of: |row| row.controller.level, show: level },
+    Lane { name: "mode", of: |row| row.controller.mode, show: mode, colours: &palette::MODES },
+    Lane { name: "stage", of: |row| row.controller.stage, show: stage, colours: &palette::STAGES },
+    Lane {
+        name: "level",
+        of: |row| row.controller.level,
+        show: |number| number.to_string(),
+        colours: &palette::LEVELS,
+    },
 ];
 
-fn mode(number: u8) -> (String, RGBColor) {
-    let place = usize::from(number);
-    let name = MODE_NAMES.get(place).map_or_else(|| format!("mode {number}"), |&n| n.to_owned());
-    (name, palette::MODES[place % palette::MODES.len()])
+fn mode(number: u8) -> String {
+    let name = MODE_NAMES.get(usize::from(number));
+    name.map_or_else(|| format!("mode {number}"), |&name| name.to_owned())
 }
 
-fn stage(number: u8) -> (String, RGBColor) {
-    let place = usize::from(number).wrapping_sub(1);
-    let name =
-        STAGE_NAMES.get(place).map_or_else(|| "none".to_owned(), |n| format!("{number} {n}"));
-    (name, palette::STAGES[place % palette::STAGES.len()])
-}
-
-fn level(number: u8) -> (String, RGBColor) {
-    let place = usize::from(number);
-    (number.to_string(), palette::LEVELS[place % palette::LEVELS.len()])
+fn stage(number: u8) -> String {
+    let name = STAGES.get(usize::from(number).wrapping_sub(1));
+    name.map_or_else(|| "none".to_owned(), |name| format!("{number} {name}"))
 }
 
 /// The three bands of `view`.
 pub(super) fn panel(view: &View) -> Panel {
-    let mut panel = view.panel("Mode, contact stage and sleeve level", "");
-    (panel.shades, panel.rules) = (Vec::new(), Vec::new());
-    let stretch = |show: fn(u8) -> (String, RGBColor)| {
-        move |(from, to, value)| {
-            let (name, colour) = show(value);
-            Stretch { from, to, name, colour }
-        }
-    };
     let band = |lane: &Lane| {
-        let all = spans(view, lane.of).into_iter().map(stretch(lane.show));
+        let stretch = |(from, to, value): (f64, f64, u8)| {
+            let colour = palette::rgb(lane.colours[usize::from(value) % lane.colours.len()]);
+            Stretch { from, to, name: (lane.show)(value), colour }
+        };
+        let all = spans(view, lane.of).into_iter().map(stretch);
         (lane.name, all.filter(|one| one.to > view.x.0 && one.from < view.x.1).collect())
     };
-    panel.bands = LANES.iter().map(band).collect();
-    panel
+    let (shades, rules) = Default::default();
+    let bands = LANES.iter().map(band).collect();
+    Panel { shades, rules, bands, ..view.panel("Mode, contact stage and sleeve level", "") }
 }
 
 /// Spans of the axis over which `of` stays the same.
@@ -91,8 +94,7 @@ mod tests {
 
     #[test]
     fn unknown_numbers_still_have_a_name() {
-        assert_eq!(mode(77).0, "mode 77");
-        assert_eq!(stage(0).0, "none");
-        assert_eq!(stage(7).0, "none");
+        assert_eq!(mode(77), "mode 77");
+        assert_eq!((&*stage(0), &*stage(7)), ("none", "none"));
     }
 }

@@ -133,9 +133,13 @@ pub fn table(differences: &[Difference]) -> (Vec<String>, Vec<Vec<String>>) {
 }
 
 /// Size of the picture, CSS pixels: its text can still be read at 400.
-const PICTURE: (u32, u32) = (700, 860);
-/// Colours of up to three.
-const COLOURS: [RGBColor; 3] = [palette::PRELOAD, palette::SPEED, palette::GAP];
+const PICTURE: (u32, u32) = (700, 1000);
+/// Colours of up to three, widths of their lines, CSS pixels, and marks: all are seen at one place.
+const LOOKS: [(RGBColor, f64, Shape); 3] = [
+    (palette::PRELOAD, 4.5, Shape::Ring),
+    (palette::SPEED, 2.5, Shape::Square),
+    (palette::GAP, 1.2, Shape::Dot),
+];
 
 /// The picture of up to three runs with their names: preload, position, slip and gap.
 pub fn beside_svg(runs: &[(String, &Recording)]) -> String {
@@ -150,16 +154,25 @@ fn panels(runs: &[(&str, &Recording)]) -> Vec<Panel> {
     let ends = views.iter().map(|view| view.x);
     let x = ends.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1))).unwrap_or_default();
     let line = |of: &dyn Fn(&Tick) -> f64| -> Vec<Line> {
-        let all = views.iter().zip(runs).zip(COLOURS);
-        all.map(|((view, (name, _)), colour)| {
+        let all = views.iter().zip(runs).zip(LOOKS);
+        all.map(|((view, (name, _)), (colour, width, _))| {
             let points = view.rows.iter().map(|row| (row.controller.t_s, of(row))).collect();
-            Line { name: (*name).to_owned().into(), look: Look::Other(colour), points }
+            Line { name: (*name).to_owned().into(), look: Look::Other(colour, width), points }
         })
         .collect()
+    };
+    // Where a run ended by a fault.
+    let ends = |of: &dyn Fn(&Tick) -> f64| {
+        let failed = views.iter().filter(|view| !view.recording.summary.faults.is_empty());
+        let end = |row: &Tick| (row.controller.t_s, of(row));
+        let points = failed.filter_map(|view| view.rows.last().map(end)).collect();
+        let name = "ended by a fault".into();
+        vec![Marks { name, shape: Shape::Dot, colour: palette::LIMIT, points }]
     };
     let panel = |title: &str, y_name, of: &dyn Fn(&Tick) -> f64| Panel {
         x,
         lines: line(of),
+        marks: ends(of),
         shades: Vec::new(),
         rules: Vec::new(),
         ..views[0].panel(title, y_name)
@@ -172,24 +185,28 @@ fn panels(runs: &[(&str, &Recording)]) -> Vec<Panel> {
     let position = panel("Position on the sleeve", "position, mm", &Tick::position_mm);
     let mut slip = panel("Gross slip of the wheel", "slip, mm", &|row| row.of_truth(|t| t.slip_mm));
     slip.least_span = 2.0;
-    let mut gap = views[0].gap();
-    gap.title = "Gap at the steps".to_owned();
-    let all = [preload, speed, position, slip, own_gaps(&views, runs, Panel { x, ..gap })];
+    let without = views.iter().find(|view| view.recording.summary.gap_ref_mm <= 0.0);
+    let gap = Panel { x, ..without.unwrap_or(&views[0]).gap() };
+    let all = [preload, speed, position, slip, own_gaps(&views, runs, gap)];
     all.into_iter().filter(Panel::has_data).collect()
 }
 
-/// The gap of every crossing, beside the reference of the first run.
+/// The gap of every crossing, beside the reference of its own run: in mm if a run has none.
 fn own_gaps(views: &[View<'_>], runs: &[(&str, &Recording)], mut panel: Panel) -> Panel {
-    let one = panel.also.map_or(1.0, |also| also.0);
-    let own = |line: &CrossingLine| {
-        let gap = Some(line.gap_mm).filter(|gap| gap.is_finite());
-        Some((line.lift_s, gap.or(line.gap_measured_mm)? / one))
-    };
-    let all = views.iter().zip(runs).zip(COLOURS);
+    let is_relative = panel.also.take().is_some();
+    panel.y_name = if is_relative { "gap, % of reference" } else { "gap, mm" };
+    panel.title = "Gap at the steps".to_owned();
+    let all = views.iter().zip(runs).zip(LOOKS);
     panel.marks = all
-        .map(|((view, (name, _)), colour)| {
-            let points = view.recording.summary.crossings.iter().filter_map(own).collect();
-            Marks { name: (*name).to_owned().into(), shape: Shape::Dot, colour, points }
+        .map(|((view, (name, _)), (colour, _, shape))| {
+            let summary = &view.recording.summary;
+            let one = if is_relative { summary.gap_ref_mm / 100.0 } else { 1.0 };
+            let own = |line: &CrossingLine| {
+                let gap = Some(line.gap_mm).filter(|gap| gap.is_finite());
+                Some((line.lift_s, gap.or(line.gap_measured_mm)? / one))
+            };
+            let points = summary.crossings.iter().filter_map(own).collect();
+            Marks { name: (*name).to_owned().into(), shape, colour, points }
         })
         .collect();
     (panel.lines, panel.shades, panel.rules) = Default::default();
@@ -233,6 +250,7 @@ mod tests {
         // Gap, slip, position, speed and preload, each since its own command.
         assert_eq!(page.matches("<figure").count(), 5);
         assert!(page.contains("gap, % of reference") && !page.contains("NaN"));
+        assert!(page.contains("ended by a fault"));
         b.parameters = b.parameters.replace("limit_n = 50.0", "limit_n = 48.5");
         let page = compare_html(("one.mcap", &a), ("two.mcap", &b));
         let row = "<tr><td>preload.limit_n</td><td>50</td><td>48.5</td></tr>";
@@ -246,9 +264,14 @@ mod tests {
         let svg =
             beside_svg(&names.map(str::to_owned).into_iter().zip([&a, &b, &b]).collect::<Vec<_>>());
         for name in names {
-            // A line in four plots; the marks, with their rims, in one; five legends.
-            assert_eq!(svg.matches(name).count(), 4 + 2 + 5, "{name}");
+            // A line in four plots; the marks, some with rims, in one; five legends.
+            assert!([10, 11].contains(&svg.matches(name).count()), "{name}");
         }
         assert!(svg.contains("reference gap") && !svg.contains("NaN"));
+        // Each gap is a part of its own run's reference.
+        let mut b = a.clone();
+        b.summary.gap_ref_mm *= 2.0;
+        let marks = panels(&[("A", &a), ("B", &b)]).pop().unwrap().marks;
+        assert!((marks[0].points[0].1 - 2.0 * marks[1].points[0].1).abs() < 1e-9);
     }
 }

@@ -6,10 +6,8 @@ use super::panel::{Look, Panel};
 use super::panels::{Across, View, figure};
 use crate::record::{CrossingLine, Recording};
 
-/// Shown before the corner touches, s.
-const BEFORE_S: f64 = 0.15;
-/// Shown after lift-off, s.
-const AFTER_S: f64 = 0.25;
+/// Shown before the corner touches and after lift-off, s.
+const AROUND_S: (f64, f64) = (0.15, 0.25);
 /// Size of a plot, CSS pixels.
 const SIZE: (u32, u32) = (540, 250);
 
@@ -24,7 +22,7 @@ pub(super) fn html(recording: &Recording) -> String {
 
 fn one(recording: &Recording, line: &CrossingLine) -> String {
     let mut html = format!("<h3>Crossing {}: step at {:.2} mm</h3>\n", line.index, line.step_mm);
-    let view = view(recording, line);
+    let view = view(recording, line, AROUND_S);
     if view.rows.is_empty() {
         return html + "<p>No rows were recorded around it.</p>\n";
     }
@@ -36,10 +34,14 @@ fn one(recording: &Recording, line: &CrossingLine) -> String {
     html + "</div>\n"
 }
 
-/// The rows around `line`.
-pub(super) fn view<'a>(recording: &'a Recording, line: &CrossingLine) -> View<'a> {
+/// The rows from so long before `line` until so long behind it, s.
+pub(super) fn view<'a>(
+    recording: &'a Recording,
+    line: &CrossingLine,
+    (before_s, after_s): (f64, f64),
+) -> View<'a> {
     let (first, last) = (line.touch_s.min(line.lift_s), line.touch_s.max(line.lift_s));
-    let x = (-BEFORE_S, last - first + AFTER_S);
+    let x = (-before_s, last - first + after_s);
     let rows = &recording.rows;
     let from = rows.partition_point(|row| row.controller.t_s < first + x.0);
     let to = rows.partition_point(|row| row.controller.t_s <= first + x.1).max(from);
@@ -50,10 +52,10 @@ pub(super) fn view<'a>(recording: &'a Recording, line: &CrossingLine) -> View<'a
 fn panels(view: &View) -> Vec<Panel> {
     let mut clearance = view.gap();
     clearance.title = "Clearance at the step root".to_owned();
-    let mut forces = view.panel("Forces of corner and lower wall", "force, N");
+    let mut forces = view.panel("Forces of corner and wall", "force, N");
     forces.lines = vec![
         view.line("corner", Look::Truth, |row| row.of_truth(|t| t.corner_force_n)),
-        view.line("lower wall", Look::Other(palette::FLOOR), |row| {
+        view.line("wall", Look::Other(palette::FLOOR, 2.0), |row| {
             row.of_truth(|t| t.floor_force_n)
         }),
     ];
@@ -72,14 +74,6 @@ mod tests {
     use crate::report::example;
 
     #[test]
-    fn every_crossing_has_its_plots() {
-        let recording = example::deploy();
-        let html = html(&recording);
-        assert_eq!(html.matches("<h3>").count(), 3);
-        assert_eq!(html.matches("<figure").count(), 18);
-    }
-
-    #[test]
     fn a_crossing_without_rows_is_said_to_have_none() {
         let mut recording = example::deploy();
         recording.rows.clear();
@@ -92,7 +86,7 @@ mod tests {
     fn a_legend_names_what_its_plot_shows() {
         let recording = example::deploy();
         for (line, measured) in recording.summary.crossings.iter().zip([true, false, true]) {
-            let view = view(&recording, line);
+            let view = view(&recording, line, AROUND_S);
             let panel = &panels(&view)[2];
             let text = panel.figure("", SIZE, "");
             assert_eq!(

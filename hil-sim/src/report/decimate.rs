@@ -45,14 +45,6 @@ mod tests {
     }
 
     #[test]
-    fn the_order_of_points_stays() {
-        let points: Vec<_> =
-            (0..1000).map(|i| (f64::from(i), (f64::from(i) * 0.7).sin())).collect();
-        let pieces = decimate(&points, (0.0, 1000.0), 50);
-        assert!(pieces[0].windows(2).all(|pair| pair[0].0 < pair[1].0));
-    }
-
-    #[test]
     fn missing_and_outside_values_break_the_line() {
         let points =
             [(0.0, 1.0), (1.0, f64::NAN), (2.0, 1.0), (3.0, f64::INFINITY), (4.0, 2.0), (9.0, 1.0)];

@@ -48,18 +48,11 @@ pub fn html(recording: &Recording, more: &[Section]) -> String {
     page += &section(
         "Crossings",
         &format!(
-            "{}<p class=\"note\">The gap of a crossing is the clearance between the step root \
-and the undeformed wheel at the instant at which the lower wall stops carrying load (on retraction: \
- begins to). {} A gap below the reference is safe; it costs a little time, as the plan takes the tread \
-stiffer than it is known. Speed: before lift-off, by the travel of the last half millimetre. Lead: how \
-long before the corner touched the preload was reached; negative: how long after that it was missing. \
-Slowed by: what keeps the crossing from being faster. The preload limit: all preload is used that the \
-largest one leaves, less the sensor's error and what the climb adds; the preload slew: more would take \
-longer to build than it saves.</p>\n",
+            include_str!("crossings.html"),
             tables::ledger(&s.crossings),
             if s.measured {
-                "This log is a controller's: every figure is measured or estimated by it, and where \
- a step was found is compared with the step table. Slip includes creep and the steps' tolerances."
+                "Every figure of this log is measured or estimated by the controller; where a step was \
+found is compared with the step table. Slip includes creep and the steps' tolerances."
             } else {
                 "Errors are against the true value."
             }
@@ -78,11 +71,10 @@ longer to build than it saves.</p>\n",
     page += &section("Log", &folded("Lines of the log", &tables::log(&recording.log)));
     let all = format!("<pre>{}</pre>\n", escape(&recording.parameters));
     let all = folded("Parameters used, as TOML", &all);
-    page += &section("Parameters", &(tables::overrides(s) + &all));
+    page += &section("Parameters", &all);
     page += &format!(
-        "<footer>\n<p>Written by hil-sim {} with the controller interstage {}.</p>\n\
+        "<footer>\n<p>Written by interstage {}.</p>\n\
 <p>Trace digest, SHA-256: <code>{}</code></p>\n</footer>\n",
-        env!("CARGO_PKG_VERSION"),
         env!("CARGO_PKG_VERSION"),
         escape(&s.trace_digest),
     );
@@ -184,17 +176,7 @@ fn plots(recording: &Recording) -> String {
     });
     let commanded = s.commanded_s.is_some();
     let zero = if commanded { "the command" } else { "the start of the controller" };
-    format!(
-        "<input type=\"radio\" name=\"across\" id=\"time\" checked>\
-<label for=\"time\">over time</label>\n\
-<input type=\"radio\" name=\"across\" id=\"position\">\
-<label for=\"position\">over position</label>\n\
-<p class=\"note\">Shaded: from the first touch of the corner (dotted) to the instant of the gap. \
-Grey line: the axle passes the face of the step. Red and amber: a fault and a limit. Time counts \
-from {zero}. The log's line of a crossing comes when the crossing is closed, behind the \
-face.{from}</p>\n\
-<div class=\"time\">\n{time}</div>\n<div class=\"position\">\n{position}</div>\n"
-    )
+    format!(include_str!("run.html"), time = time, position = position, zero = zero, from = from)
 }
 
 fn stack(recording: &Recording, across: Across) -> String {

@@ -15,7 +15,7 @@ pub(crate) const TOUCH: RGBColor = RGBColor(0xb4, 0x53, 0x09);
 pub(crate) const FACE: RGBColor = RGBColor(0x64, 0x74, 0x8b);
 
 /// A limit that was reported.
-pub(crate) const WARNING: RGBColor = RGBColor(0xd9, 0x9a, 0x06);
+pub(crate) const WARNING: RGBColor = RGBColor(0xa1, 0x62, 0x07);
 
 /// Simulated by the reference models; drawn dashed.
 pub const SIMULATED: RGBColor = RGBColor(0x1c, 0x6f, 0xd6);
@@ -39,35 +39,23 @@ pub const GRID: RGBColor = RGBColor(0xe9, 0xeb, 0xef);
 pub(crate) const SHADE: RGBColor = RGBColor(0xfa, 0xf1, 0xdf);
 
 /// Pale fills for the modes, by mode number.
-pub const MODES: [RGBColor; 13] = [
-    RGBColor(0xe5, 0xe7, 0xeb),
-    RGBColor(0xd1, 0xd5, 0xdb),
-    RGBColor(0xc7, 0xd2, 0xe8),
-    RGBColor(0xee, 0xf0, 0xf3),
-    RGBColor(0xdd, 0xd0, 0xf2),
-    RGBColor(0xc3, 0xe3, 0xf5),
-    RGBColor(0xfc, 0xe3, 0xa6),
-    RGBColor(0xf9, 0xb9, 0x8f),
-    RGBColor(0xcb, 0xe8, 0xc4),
-    RGBColor(0xd8, 0xc9, 0xb8),
-    RGBColor(0xa8, 0xdc, 0xb4),
-    RGBColor(0xf2, 0x9b, 0x9b),
-    RGBColor(0xbc, 0xc1, 0xca),
+pub(crate) const MODES: [u32; 13] = [
+    0xe5e7eb, 0xd1d5db, 0xc7d2e8, 0xeef0f3, 0xddd0f2, 0xc3e3f5, 0xfce3a6, 0xf9b98f, 0xcbe8c4,
+    0xd8c9b8, 0xa8dcb4, 0xf29b9b, 0xbcc1ca,
 ];
 
-/// Pale fills for how a run ended: well, with slip, not at all.
-pub(crate) const OUTCOMES: [RGBColor; 3] =
-    [RGBColor(0xb9, 0xe3, 0xc3), RGBColor(0xfc, 0xe3, 0xa6), RGBColor(0xf4, 0xb8, 0xb8)];
-
-/// Pale fills for the contact stages, from number 1.
-pub const STAGES: [RGBColor; 6] = [
-    RGBColor(0xe5, 0xe7, 0xeb),
-    RGBColor(0xdd, 0xd0, 0xf2),
-    RGBColor(0xfb, 0xd5, 0xb5),
-    RGBColor(0xf2, 0x9b, 0x9b),
-    RGBColor(0xfc, 0xe3, 0xa6),
-    RGBColor(0xc3, 0xe3, 0xf5),
-];
+/// Pale fills for the contact stages; the first is for none.
+pub(crate) const STAGES: [u32; 7] =
+    [0xe5e7eb, 0xe5e7eb, 0xddd0f2, 0xfbd5b5, 0xe8b87a, 0xfce3a6, 0xc3e3f5];
 
 /// Pale fills for the sleeve levels, repeated.
-pub(crate) const LEVELS: [RGBColor; 2] = [RGBColor(0xe9, 0xec, 0xf1), RGBColor(0xd6, 0xdc, 0xe5)];
+pub(crate) const LEVELS: [u32; 2] = [0xe9ecf1, 0xd6dce5];
+
+/// Pale fills for how a run ended: well, with slip, not at all.
+pub(crate) const OUTCOMES: [RGBColor; 3] = [rgb(0xb9e3c3), rgb(0xfce3a6), rgb(0xf4b8b8)];
+
+/// The colour of its usual six digits.
+pub(crate) const fn rgb(digits: u32) -> RGBColor {
+    let [_, red, green, blue] = digits.to_be_bytes();
+    RGBColor(red, green, blue)
+}

@@ -28,14 +28,12 @@ const GRID: &str = "#e9ebef";
 /// What a line shows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Look {
-    /// A sensor's reading: thin, above the truth.
+    /// A sensor's reading or the controller's estimate: thin, above the truth.
     Measured(RGBColor),
     /// True state of the plant: dark and wide, below the others.
     Truth,
-    /// Another true state of the plant.
-    Other(RGBColor),
-    /// The controller's estimate: thin, above the truth.
-    Estimate(RGBColor),
+    /// Another true state of the plant, or one of several runs: with its width, CSS pixels.
+    Other(RGBColor, f64),
     /// A reference: dashed.
     Wanted,
     /// A bound: dashed, red.
@@ -47,12 +45,15 @@ impl Look {
     fn style(self) -> (u8, RGBColor, f64) {
         match self {
             Self::Truth => (0, palette::TRUTH, 3.0),
-            Self::Other(colour) => (1, colour, 2.0),
+            Self::Other(colour, width) => (1, colour, width),
             Self::Measured(colour) => (2, colour, 1.5),
-            Self::Estimate(colour) => (3, colour, 1.5),
-            Self::Wanted => (4, palette::WANTED, 1.5),
-            Self::Limit => (5, palette::LIMIT, 1.2),
+            Self::Wanted => (3, palette::WANTED, 1.5),
+            Self::Limit => (4, palette::LIMIT, 1.2),
         }
+    }
+
+    pub(crate) fn colour(self) -> RGBColor {
+        self.style().1
     }
 
     /// Attributes of a stroke.
@@ -81,7 +82,7 @@ pub(crate) struct Line {
     pub(crate) points: Vec<(f64, f64)>,
 }
 
-/// Shape of a mark. Those of one place can be seen beside each other.
+/// Shape of a mark. At one place a ring, a square above it and a dot above both can be seen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Shape {
     Dot,
@@ -90,13 +91,19 @@ pub(crate) enum Shape {
 }
 
 impl Shape {
-    /// The strokes of a mark, from below: class, cap and width, CSS pixels.
-    fn strokes(self) -> &'static [(&'static str, &'static str, f64)] {
-        match self {
-            Self::Dot => &[("rim", "round", 9.0), ("mark", "round", 7.0)],
-            Self::Ring => &[("mark", "round", 15.0), ("rim", "round", 11.0)],
-            Self::Square => &[("rim", "square", 13.0), ("mark", "square", 11.0)],
-        }
+    /// The strokes of a mark of this colour, from below: class and attributes.
+    fn strokes(self, colour: RGBColor) -> impl Iterator<Item = (&'static str, String)> {
+        // Cap and width, CSS pixels.
+        let all: &[_] = match self {
+            Self::Dot => &[("rim", "round", 7.0), ("mark", "round", 5.0)],
+            Self::Ring => &[("mark", "round", 15.5), ("rim", "round", 12.5)],
+            Self::Square => &[("mark", "square", 8.5)],
+        };
+        all.iter().map(move |&(class, cap, width)| {
+            let colour = if class == "rim" { "white".to_owned() } else { hex(colour) };
+            let width = format!("stroke-width=\"{width}\" stroke-linecap=\"{cap}\"");
+            (class, format!("stroke=\"{colour}\" {width}"))
+        })
     }
 }
 
@@ -136,9 +143,9 @@ pub(crate) struct Panel {
     pub(crate) bands: Vec<(&'static str, Vec<Stretch>)>,
     /// Horizontal lines with their names.
     pub(crate) levels: Vec<(&'static str, Look, f64)>,
-    /// Spans of x that are shaded.
-    pub(crate) shades: Vec<(f64, f64)>,
-    /// Vertical lines with their names.
+    /// Spans of x that are shaded, with their names.
+    pub(crate) shades: Vec<(f64, f64, String)>,
+    /// Vertical lines with their names, if they have any.
     pub(crate) rules: Vec<Rule>,
 }
 
@@ -150,6 +157,15 @@ pub(crate) struct Rule {
     /// That of a touch of a corner, a face, a fault or a limit.
     pub(crate) colour: RGBColor,
 }
+
+impl Rule {
+    fn is_fault(&self) -> bool {
+        self.colour == palette::LIMIT
+    }
+}
+
+/// Of a rule's name: anchor, distance from the line, and the part of the name that is left of that.
+type Anchor = (&'static str, f64, f64);
 
 /// Plots over one axis, one below the other, as an SVG of this size on white, CSS pixels.
 pub(crate) fn stacked((wide, high): (u32, u32), panels: &mut [Panel]) -> String {
@@ -179,20 +195,15 @@ impl Panel {
     /// The plot as a figure of a page, `attributes` and its `name` for screen readers with it. Title and
     /// legend are text, so that they wrap, and have room for the values at the cursor.
     pub(crate) fn figure(&self, attributes: &str, (wide, high): (u32, u32), name: &str) -> String {
-        let (x, y) = (self.x, self.y_range());
-        let also = self
-            .also
-            .map_or_else(String::new, |(factor, unit)| format!(" data-also=\"{factor} {unit}\""));
+        let ((from, to), (low, high_y), least) = (self.x, self.y_range(), self.least_span);
+        let also = self.also.map(|(factor, unit)| format!(" data-also=\"{factor} {unit}\""));
         let legend: String = self.legend().iter().map(Sample::html).collect();
         format!(
-            "<figure {attributes} data-x=\"{} {}\" data-y=\"{} {}\" \
-data-least=\"{}\"{also}>\n<figcaption><b>{}</b><output></output>{legend}</figcaption>\n\
+            "<figure {attributes} data-of=\"{}\" data-x=\"{from} {to}\" data-y=\"{low} {high_y}\" \
+data-least=\"{least}\"{}>\n<figcaption><b>{}</b><output></output>{legend}</figcaption>\n\
 <svg class=\"plot\" viewBox=\"0 0 {wide} {high}\" role=\"img\" aria-label=\"{}\">\n{}</svg></figure>\n",
-            x.0,
-            x.1,
-            y.0,
-            y.1,
-            self.least_span,
+            escape(self.y_name),
+            also.unwrap_or_default(),
             escape(&self.title),
             escape(name),
             self.plot((f64::from(wide), f64::from(high))),
@@ -220,21 +231,18 @@ data-least=\"{}\"{also}>\n<figcaption><b>{}</b><output></output>{legend}</figcap
         let (across, down) = (wide - LEFT - RIGHT, bottom - RULES);
         let x_at = |value: f64| LEFT + (value - x.0) / (x.1 - x.0) * across;
         let y_at = |value: f64| bottom - (value - y.0) / (y.1 - y.0) * down;
-        let text = |at: (f64, f64), anchor: &str, more: &str, text: &str| {
+        let text = |(x, y): (f64, f64), anchor: &str, more: &str, text: &str| {
+            let text = escape(text);
             format!(
-                "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"{anchor}\"{more}>{}</text>\n",
-                at.0,
-                at.1,
-                escape(text)
+                "<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\"{more}>{text}</text>\n"
             )
         };
+        let grid = |d: String| format!("<path class=\"grid\" stroke=\"{GRID}\" d=\"{d}\"/>\n");
         let mut axes = String::new();
         let (ticks, decimals) = axis::ticks(x, (wide / 75.0).max(2.0) as usize);
         for tick in ticks {
             let at = x_at(tick);
-            axes += &format!(
-                "<path class=\"grid\" stroke=\"{GRID}\" d=\"M{at:.1} {RULES}V{bottom:.1}\"/>\n"
-            );
+            axes += &grid(format!("M{at:.1} {RULES}V{bottom:.1}"));
             if self.x_name.is_some() {
                 axes += &text((at, bottom + 16.0), "middle", "", &axis::label(tick, decimals));
             }
@@ -242,10 +250,7 @@ data-least=\"{}\"{also}>\n<figcaption><b>{}</b><output></output>{legend}</figcap
         let (ticks, decimals) = axis::ticks(y, (high / 27.0).clamp(2.0, 7.0) as usize);
         for tick in ticks.into_iter().filter(|_| self.bands.is_empty()) {
             let at = y_at(tick);
-            let right = wide - RIGHT;
-            axes += &format!(
-                "<path class=\"grid\" stroke=\"{GRID}\" d=\"M{LEFT} {at:.1}H{right}\"/>\n"
-            );
+            axes += &grid(format!("M{LEFT} {at:.1}H{}", wide - RIGHT));
             axes += &text((LEFT - 6.0, at + 4.0), "end", "", &axis::label(tick, decimals));
         }
         let mut names = String::new();
@@ -260,19 +265,9 @@ data-least=\"{}\"{also}>\n<figcaption><b>{}</b><output></output>{legend}</figcap
         }
         let size = format!(" font-size=\"{RULE_PX}\"");
         let mut labels = String::new();
-        for (at, side, rule) in self.rule_names(x_at, wide) {
-            let more = format!("{size} fill=\"{}\"", hex(rule.colour));
-            labels += &text((at, 0.75 * RULES), side, &more, &rule.name);
-        }
-        for (place, (_, stretches)) in self.bands.iter().enumerate() {
-            for Stretch { from, to, name, .. } in stretches {
-                let (from, to) = (x_at(from.max(x.0)), x_at(to.min(x.1)));
-                if width(name, RULE_PX) + 4.0 <= to - from {
-                    let at = (0.5 * (from + to), y_at(-0.5 - place as f64) + 4.0);
-                    let more = format!("{size} fill=\"#1f2937\"");
-                    labels += &text(at, "middle", &more, name);
-                }
-            }
+        for (at, anchor, name, colour) in self.names(x_at, wide) {
+            let more = format!("{size} fill=\"{}\"", hex(colour));
+            labels += &text((at, 0.75 * RULES), anchor, &more, name);
         }
         format!(
             "<g class=\"text\" font-family=\"sans-serif\" font-size=\"{TEXT_PX}\" fill=\"#374151\">\n\
@@ -290,26 +285,39 @@ height=\"{down}\" viewBox=\"{} {} {} {}\" preserveAspectRatio=\"none\">\n\
         )
     }
 
-    /// Where the names of the rules are: touches behind the others; a name that would be on another one is left
-    /// out.
-    fn rule_names(&self, x_at: impl Fn(f64) -> f64, wide: f64) -> Vec<(f64, &'static str, &Rule)> {
+    /// Places, anchors, names and colours for rules and shaded spans. Faults choose first, then spans. A
+    /// name without room to the right of its rule is to the left, else left out unless a fault's.
+    fn names<'a>(
+        &'a self,
+        x_at: impl Fn(f64) -> f64,
+        wide: f64,
+    ) -> Vec<(f64, &'static str, &'a str, RGBColor)> {
+        let shown = |rule: &&Rule| (self.x.0..=self.x.1).contains(&rule.x) && !rule.name.is_empty();
+        let (faults, limits): (Vec<&Rule>, Vec<&Rule>) =
+            self.rules.iter().filter(shown).partition(|rule| rule.is_fault());
+        let beside: [Anchor; 2] = [("start", 2.0, 0.0), ("end", -2.0, 1.0)];
+        let rule = |rule: &Rule| (x_at(rule.x), &beside[..], rule.colour);
+        let rules = |rules: Vec<&'a Rule>| rules.into_iter().map(|one| (rule(one), &*one.name));
+        let spans = self.shades.iter().filter_map(|(from, to, name)| {
+            let (from, to) = (from.max(self.x.0), to.min(self.x.1));
+            let at = (x_at(0.5 * (from + to)), &[("middle", 0.0, 0.5)][..], palette::FACE);
+            (from < to).then_some((at, &**name))
+        });
         let mut taken: Vec<(f64, f64)> = Vec::new();
-        let is_touch = |rule: &&Rule| rule.colour == palette::TOUCH;
-        let rules = self.rules.iter().filter(|rule| (self.x.0..=self.x.1).contains(&rule.x));
-        let (touches, faces): (Vec<&Rule>, Vec<&Rule>) = rules.partition(is_touch);
-        let mut place = |rule: &Rule| {
-            let (x, width) = (x_at(rule.x), width(&rule.name, RULE_PX));
-            let is_left = is_touch(&rule) || x + width > wide;
-            let (at, side) = if is_left { (x - 2.0, "end") } else { (x + 2.0, "start") };
-            let from = if is_left { at - width } else { at };
-            let is_free = taken.iter().all(|other| from >= other.1 || from + width <= other.0);
-            is_free.then(|| {
-                taken.push((from, from + width));
-                (at, side)
-            })
+        let place = |((at, anchors, colour), name): ((f64, &[Anchor], _), _)| {
+            let long = width(name, RULE_PX);
+            let from = |anchor: &Anchor| at + anchor.1 - anchor.2 * long;
+            let within = |anchor: &&Anchor| from(anchor) >= 0.0 && from(anchor) + long <= wide;
+            let is_free = |anchor: &&Anchor| {
+                taken.iter().all(|other| from(anchor) >= other.1 || from(anchor) + long <= other.0)
+            };
+            let mut places = anchors.iter().filter(within);
+            let forced = places.clone().next_back().filter(|_| colour == palette::LIMIT);
+            let anchor = places.find(is_free).or(forced)?;
+            taken.push((from(anchor) - 2.0, from(anchor) + long + 2.0));
+            Some((at + anchor.1, anchor.0, name, colour))
         };
-        let all = faces.into_iter().chain(touches);
-        all.filter_map(|rule| place(rule).map(|(at, side)| (at, side, rule))).collect()
+        rules(faults).chain(spans).chain(rules(limits)).filter_map(place).collect()
     }
 
     /// Everything with a place on both axes, in their units, for a plot that is `across` CSS pixels wide.
@@ -322,37 +330,32 @@ height=\"{down}\" viewBox=\"{} {} {} {}\" preserveAspectRatio=\"none\">\n\
             format!("<path class=\"{class}\" data-name=\"{name}\" {stroke} d=\"{d}\"/>\n")
         };
         let mut svg = String::new();
-        let rect = |class: &str,
-                    colour: RGBColor,
-                    (from, to): (f64, f64),
-                    (low, high): (f64, f64)| {
+        let rect = |class: &str, colour, span: (f64, f64), (low, high): (f64, f64), name: &str| {
+            let (from, wide) = (digits(span.0, x), digits(span.1 - span.0, x).max(0.0));
+            let (fill, name, high) = (hex(colour), escape(name), high - low);
             format!(
-                "<rect class=\"{class}\" fill=\"{}\" x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\"",
-                hex(colour),
-                digits(from, x),
-                low,
-                digits(to - from, x).max(0.0),
-                high - low
+                "<rect class=\"{class}\" data-name=\"{name}\" fill=\"{fill}\" x=\"{from}\" \
+y=\"{low}\" width=\"{wide}\" height=\"{high}\"/>\n"
             )
         };
-        for &span in &self.shades {
-            svg += &rect("shade", palette::SHADE, span, (y.0 - tall, y.1 + tall));
-            svg += "/>\n";
+        for (from, to, name) in &self.shades {
+            let all = (y.0 - tall, y.1 + tall);
+            svg += &rect("shade", palette::SHADE, (*from, *to), all, name);
         }
         for (place, (_, stretches)) in self.bands.iter().enumerate() {
             let low = -0.92 - place as f64;
             for Stretch { from, to, name, colour } in stretches {
-                svg += &rect("band", *colour, (*from, *to), (low, low + 0.84));
-                svg += &format!(" data-name=\"{}\"/>\n", escape(name));
+                svg += &rect("band", *colour, (*from, *to), (low, low + 0.84), name);
             }
         }
         for &(name, look, level) in &self.levels {
             let d = format!("M{} {level}H{}", x.0 - long, x.1 + long);
             svg += &path("level", name, &look.stroke(), &d);
         }
-        for Rule { x: at, name, colour } in &self.rules {
-            let d = format!("M{} {}V{}", digits(*at, x), y.0 - tall, y.1 + tall);
-            svg += &path("rule", name, &stroke(*colour, 1.5), &d);
+        for rule in &self.rules {
+            let d = format!("M{} {}V{}", digits(rule.x, x), y.0 - tall, y.1 + tall);
+            let class = if rule.is_fault() { "rule fault" } else { "rule" };
+            svg += &path(class, &rule.name, &stroke(rule.colour, 1.5), &d);
         }
         let point = |&(a, b): &(f64, f64)| format!("{} {}", digits(a, x), digits(b, y));
         let mut lines: Vec<&Line> = self.lines.iter().collect();
@@ -379,11 +382,7 @@ height=\"{down}\" viewBox=\"{} {} {} {}\" preserveAspectRatio=\"none\">\n\
         for Marks { name, shape, colour, points } in &self.marks {
             let points = points.iter().filter(|point| point.0.is_finite() && point.1.is_finite());
             let d: String = points.map(|at| format!("M{}h0", point(at))).collect();
-            for (class, cap, width) in shape.strokes() {
-                let colour = if *class == "rim" { "white".to_owned() } else { hex(*colour) };
-                let stroke = format!(
-                    "stroke=\"{colour}\" stroke-width=\"{width}\" stroke-linecap=\"{cap}\""
-                );
+            for (class, stroke) in shape.strokes(*colour) {
                 svg += &path(class, name, &stroke, &d);
             }
         }
@@ -391,7 +390,7 @@ height=\"{down}\" viewBox=\"{} {} {} {}\" preserveAspectRatio=\"none\">\n\
     }
 
     /// Vertical range of all that is shown. It begins at zero where that hides nothing.
-    fn y_range(&self) -> (f64, f64) {
+    pub(super) fn y_range(&self) -> (f64, f64) {
         if let Some(range) = self.y {
             return range;
         }
@@ -403,7 +402,7 @@ height=\"{down}\" viewBox=\"{} {} {} {}\" preserveAspectRatio=\"none\">\n\
         let range = axis::extent(shown.map(|point| point.1).chain(levels)).unwrap_or((0.0, 1.0));
         let missing = (0.5 * (self.least_span - (range.1 - range.0))).max(0.0);
         let (low, high) = axis::padded((range.0 - missing, range.1 + missing), 0.06);
-        let near_zero = (-0.02 * range.1..0.3 * range.1).contains(&range.0);
+        let near_zero = (-0.02 * range.1..=0.3 * range.1).contains(&range.0);
         (if near_zero { 0.0 } else { low }, high)
     }
 
@@ -454,5 +453,6 @@ mod tests {
         assert_eq!(range([(0.0, 8.0), (1.0, 30.0)]).0, 0.0);
         assert!(range([(0.0, 20.0), (1.0, 30.0)]).0 > 19.0);
         assert!(range([(0.0, -5.0), (1.0, 30.0)]).0 < -5.0);
+        assert_eq!(range([(0.0, 0.0), (1.0, 0.0)]).0, 0.0);
     }
 }

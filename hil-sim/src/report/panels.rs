@@ -7,6 +7,7 @@ use super::palette;
 use super::panel::{Line, Look, Marks, Panel, Rule, Shape, stacked};
 use super::verdict::GAP_TOLERANCE;
 use crate::record::{CrossingLine, Recording, Report, Tick};
+use crate::scenario::Scenario;
 
 /// Size of the overview, CSS pixels.
 const OVERVIEW: (u32, u32) = (1000, 820);
@@ -81,8 +82,8 @@ pub(super) struct View<'a> {
     pub(super) rows: &'a [Tick],
     pub(super) across: Across,
     pub(super) x: (f64, f64),
-    pub(super) shades: Vec<(f64, f64)>,
-    /// First touches and faces.
+    pub(super) shades: Vec<(f64, f64, String)>,
+    /// First touches, faces, faults and limits.
     pub(super) rules: Vec<Rule>,
     /// Largest preload, N, if the parameters have it.
     pub(super) limit_n: Option<f64>,
@@ -92,9 +93,10 @@ impl<'a> View<'a> {
     /// All of `recording`.
     pub(super) fn new(recording: &'a Recording, across: Across) -> Self {
         let rows = &recording.rows[..];
+        let parameters = Scenario::parse("parameters", &recording.parameters, &[]);
         let span = |c: &CrossingLine| {
             let (from, to) = (across.at(rows, c.touch_s), across.at(rows, c.lift_s));
-            (from.min(to), from.max(to))
+            (from.min(to), from.max(to), format!("step {}", c.index))
         };
         Self {
             recording,
@@ -109,7 +111,7 @@ impl<'a> View<'a> {
                 .flat_map(|c| rules(rows, across, c))
                 .chain(reports(recording, across))
                 .collect(),
-            limit_n: parameter(&recording.parameters, "preload", "limit_n"),
+            limit_n: parameters.ok().map(|scenario| scenario.rig.preload.limit_n),
         }
     }
 
@@ -164,28 +166,24 @@ impl<'a> View<'a> {
     }
 
     pub(super) fn speed(&self) -> Panel {
-        let mut panel = self.panel("Speed", "speed, mm/s");
-        panel.least_span = 2.0;
-        panel.lines = vec![
+        let lines = vec![
             self.line("reference", Look::Wanted, |row| row.controller.speed_ref_mm_s),
-            self.line("estimated", Look::Estimate(palette::SPEED), |row| {
+            self.line("estimated", Look::Measured(palette::SPEED), |row| {
                 row.controller.wheel_speed_mm_s
             }),
             self.line("true", Look::Truth, |row| row.of_truth(|t| t.speed_true_mm_s)),
         ];
-        panel
+        Panel { least_span: 2.0, lines, ..self.panel("Speed", "speed, mm/s") }
     }
 
     pub(super) fn preload(&self) -> Panel {
-        let mut panel = self.panel("Preload", "preload, N");
-        panel.least_span = 4.0;
-        panel.lines = vec![
+        let lines = vec![
             self.line("reference", Look::Wanted, |row| row.controller.preload_ref_n),
             self.line("measured", Look::Measured(palette::PRELOAD), |row| row.controller.preload_n),
             self.line("true", Look::Truth, |row| row.of_truth(|t| t.preload_true_n)),
         ];
-        panel.levels = self.limit_n.iter().map(|&n| ("limit", Look::Limit, n)).collect();
-        panel
+        let levels = self.limit_n.iter().map(|&n| ("limit", Look::Limit, n)).collect();
+        Panel { least_span: 4.0, lines, levels, ..self.panel("Preload", "preload, N") }
     }
 
     /// The clearance as a part of the reference gap; in mm where there is none.
@@ -193,8 +191,8 @@ impl<'a> View<'a> {
         let summary = &self.recording.summary;
         let reference_mm = Some(summary.gap_ref_mm).filter(|gap| *gap > 0.0);
         let (one, y_name) = match reference_mm {
-            Some(gap) => (gap / 100.0, "gap, % of reference"),
-            None => (1.0, "gap, mm"),
+            Some(gap) => (gap / 100.0, "clearance, % of reference"),
+            None => (1.0, "clearance, mm"),
         };
         let mut panel = self.panel("Clearance at the step root, and the gap", y_name);
         panel.also = reference_mm.map(|_| (one, "mm"));
@@ -202,10 +200,10 @@ impl<'a> View<'a> {
             self.line("clearance", Look::Truth, |row| row.of_truth(|t| t.root_clearance_mm) / one),
         ];
         panel.marks = vec![
+            self.marks("measured", (Shape::Ring, palette::GAP), |c| Some(c.gap_measured_mm? / one)),
             self.marks("predicted", (Shape::Square, palette::FLOOR), |c| {
                 Some(c.gap_predicted_mm? / one)
             }),
-            self.marks("measured", (Shape::Ring, palette::GAP), |c| Some(c.gap_measured_mm? / one)),
             self.marks("true gap", (Shape::Dot, palette::TRUTH), |c| Some(c.gap_mm / one)),
         ];
         let most = 100.0 * (1.0 + GAP_TOLERANCE);
@@ -225,63 +223,52 @@ impl<'a> View<'a> {
     }
 
     pub(super) fn radius(&self) -> Panel {
-        let mut panel = self.panel("Radial position of the wheel centre", "radius, mm");
-        panel.lines = vec![
-            self.line("from the arm angle", Look::Estimate(palette::RADIUS), |row| {
+        let lines = vec![
+            self.line("from the arm angle", Look::Measured(palette::RADIUS), |row| {
                 row.controller.radius_mm
             }),
             self.line("true", Look::Truth, |row| row.of_truth(|t| t.radius_true_mm)),
         ];
-        panel
+        Panel { lines, ..self.panel("Radial position of the wheel centre", "radius, mm") }
     }
 
     pub(super) fn slip_margin(&self) -> Panel {
-        let mut panel = self.panel("Slip margin", "friction unused, ratio");
+        let mut panel = self.panel("Slip margin", "friction left, µ - used");
         panel.least_span = 0.2;
         panel.lines = vec![
-            self.line("by the model", Look::Estimate(palette::SLIP), |row| {
-                row.controller.slip_margin
-            }),
+            self.line("planned", Look::Measured(palette::SLIP), |row| row.controller.slip_margin),
             self.line("true", Look::Truth, |row| row.of_truth(|t| t.slip_margin_true)),
         ];
         panel.levels = vec![("slip", Look::Limit, 0.0)];
+        let (low, high) = panel.y_range();
+        panel.y = Some((low.min(-0.1), high));
         panel
     }
 
     pub(super) fn compression(&self) -> Panel {
-        let mut panel = self.panel("Tread compression", "compression, mm");
-        panel.least_span = 0.1;
-        panel.lines = vec![
+        let lines = vec![
             self.line("measured", Look::Measured(palette::COMPRESSION), |row| {
                 row.controller.compression_mm
             }),
             self.line("true", Look::Truth, |row| row.of_truth(|t| t.compression_true_mm)),
         ];
-        panel
+        Panel { least_span: 0.1, lines, ..self.panel("Tread compression", "compression, mm") }
     }
 
     /// What the motors are told.
     fn duty(&self) -> Panel {
-        let mut panel = self.panel("Duty of the motors", "duty, of full");
-        panel.least_span = 0.1;
-        panel.lines = vec![
+        let lines = vec![
             self.line("drive", Look::Measured(palette::SPEED), |row| row.controller.drive_duty),
             self.line("pre-tightener", Look::Measured(palette::PRELOAD), |row| {
                 row.controller.pretightener_duty
             }),
         ];
-        panel
+        Panel { least_span: 0.1, lines, ..self.panel("Duty of the motors", "duty, of full") }
     }
 }
 
 /// Where the corner first touched and where the axle passed the face.
 fn rules(rows: &[Tick], across: Across, line: &CrossingLine) -> Vec<Rule> {
-    let long = matches!(across, Across::Since(_));
-    let touch = Rule {
-        x: across.at(rows, line.touch_s),
-        name: if long { "corner touches" } else { "touch" }.to_owned(),
-        colour: palette::TOUCH,
-    };
     let from = rows.partition_point(|row| row.controller.t_s < line.touch_s.min(line.lift_s));
     let ahead = |row: &Tick| row.position_mm() < line.step_mm;
     let side = rows.get(from).map(ahead);
@@ -290,22 +277,27 @@ fn rules(rows: &[Tick], across: Across, line: &CrossingLine) -> Vec<Rule> {
         Across::Position => Some(line.step_mm),
         _ => passed.map(|row| across.of(row)),
     };
-    let name = format!("step {}", line.index);
-    let face = face_x.map(|x| Rule { x, name, colour: palette::FACE });
-    [touch].into_iter().chain(face).collect()
+    let touch = (across.at(rows, line.touch_s), palette::TOUCH);
+    let face = face_x.map(|x| (x, palette::FACE));
+    let rule = |(x, colour)| Rule { x, name: String::new(), colour };
+    [touch].into_iter().chain(face).map(rule).collect()
 }
 
-/// Faults and limits, by their codes.
+/// Faults and limits by their codes, those at one place together.
 fn reports(recording: &Recording, across: Across) -> Vec<Rule> {
     let Recording { summary, rows, .. } = recording;
-    let rule = |(report, colour): (&Report, RGBColor)| Rule {
-        x: across.at(rows, report.t_s),
-        name: report.code.to_string(),
-        colour,
-    };
     let faults = summary.faults.iter().map(|report| (report, palette::LIMIT));
     let limits = summary.limits.iter().map(|report| (report, palette::WARNING));
-    faults.chain(limits).map(rule).collect()
+    let mut rules: Vec<Rule> = Vec::new();
+    for (Report { t_s, code, .. }, colour) in faults.chain(limits) {
+        // What ended the run is reported behind its last row.
+        let x = across.at(rows, *t_s).min(across.range(rows).1);
+        match rules.iter_mut().find(|rule| (rule.x - x).abs() < 1e-9) {
+            Some(rule) => rule.name += &format!(", {code}"),
+            None => rules.push(Rule { x, name: code.to_string(), colour }),
+        }
+    }
+    rules
 }
 
 /// Speed, preload, gap and radius of a run over time from the command on, stacked, as an SVG of
@@ -314,13 +306,6 @@ pub fn overview_svg(recording: &Recording) -> String {
     let recording = &recording.since_command();
     let view = View::new(recording, Across::Time);
     stacked(OVERVIEW, &mut [view.speed(), view.preload(), view.gap(), view.radius()])
-}
-
-/// The number at `section.name` of parameters written as TOML.
-pub(super) fn parameter(parameters: &str, section: &str, name: &str) -> Option<f64> {
-    let table: toml::Table = parameters.parse().ok()?;
-    let value = table.get(section)?.get(name)?;
-    value.as_float().or_else(|| value.as_integer().map(|n| n as f64))
 }
 
 /// A plot, with what the script needs to place its cursor: axis, and time at its zero.
@@ -335,21 +320,13 @@ mod tests {
     use crate::report::example;
 
     #[test]
-    fn parameters_are_found_by_section_and_name() {
-        let recording = example::deploy();
-        assert_eq!(parameter(&recording.parameters, "preload", "limit_n"), Some(50.0));
-        assert_eq!(parameter("", "preload", "limit_n"), None);
-        assert_eq!(parameter("[preload]\nlimit_n = 50", "preload", "limit_n"), Some(50.0));
-    }
-
-    #[test]
     fn crossings_are_shaded_on_both_axes() {
         let recording = example::deploy();
         let time = View::new(&recording, Across::Time);
         let position = View::new(&recording, Across::Position);
         let crossings = &recording.summary.crossings;
         for ((line, time), position) in crossings.iter().zip(&time.shades).zip(&position.shades) {
-            assert_eq!(*time, (line.touch_s, line.lift_s));
+            assert_eq!(*time, (line.touch_s, line.lift_s, format!("step {}", line.index)));
             assert!(position.0 < position.1 && position.1 < line.step_mm);
         }
     }

@@ -8,6 +8,8 @@ const plots = (() => {
   // Times and positions of the run.
   const track = page ? JSON.parse(page.textContent) : [];
   const groups = new Map();
+  // Every line over time by clock, axis and name.
+  const series = new Map();
   let picked = () => {};
 
   // The value of y at x on a line of points; null where there is none. The line may turn back.
@@ -58,11 +60,21 @@ const plots = (() => {
       const [x, y, width] = ["x", "y", "width"].map((name) => Number(rect.getAttribute(name)));
       return { x, width, lane: Math.round(-y - 0.92), name: rect.dataset.name };
     });
+    const lanes = -full.y[0] * Math.sign(bands.length);
     const spans = [...figure.querySelectorAll("figcaption span")];
     const also = figure.dataset.also && figure.dataset.also.split(" ");
     const decimals = also ? 1 : Math.min(4, Math.max(0, 3 - Math.floor(Math.log10(full.y[1] - full.y[0]))));
     const since = Number(figure.dataset.since), overPosition = figure.dataset.across === "position";
-    const clock = figure.closest("[data-clock]");
+    const clock = figure.closest("[data-clock]"), clocks = [...document.querySelectorAll("[data-clock]")];
+    const key = (name) => [clocks.indexOf(clock), figure.dataset.of, name].join();
+    for (const [name, line] of overPosition ? [] : lines) {
+      const own = { line, since, x: full.x, long: full.x[1] - full.x[0] };
+      series.set(key(name), [...(series.get(key(name)) || []), own].sort((a, b) => a.long - b.long));
+    }
+    // The value at t from the most enlarged plot, so that every plot shows the same.
+    const valueAt = (name, t) => (series.get(key(name)) || [])
+      .filter((one) => t - one.since >= one.x[0] && t - one.since <= one.x[1])
+      .reduce((found, one) => found ?? along(one.line, t - one.since), null);
     const cursor = element("path", { class: "cursor" }), chosen = element("rect", { class: "chosen", y: top, height: down });
     svg.append(chosen, cursor);
     let { x, y } = full, width = wide, at = null, from = null;
@@ -113,25 +125,38 @@ const plots = (() => {
       }
       svg.querySelector(".axes").replaceChildren(...axes);
       const labels = svg.querySelector(".labels"), taken = [];
-      const add = (text, place, more, low, high) => {
-        const label = element("text", { ...more, x: place, "font-size": 11 }, text);
+      // A text at the first of these places where there is room; a fault's without room at the last.
+      const add = (text, places, more, low, high, isFault) => {
+        const label = element("text", { ...more, "font-size": 11 }, text);
         labels.append(label);
-        const from = label.getBBox().x, to = from + label.getBBox().width;
-        const free = from >= low && to <= high && taken.every(([a, b, y]) => y !== more.y || from >= b || to <= a);
-        if (free) taken.push([from - 4, to + 4, more.y]); else label.remove();
-        return free;
+        for (const [x, anchor] of places) {
+          label.setAttribute("x", x);
+          label.setAttribute("text-anchor", anchor);
+          const from = label.getBBox().x, to = from + label.getBBox().width;
+          if (from >= low && to <= high && taken.every(([a, b, y]) => y !== more.y || from >= b || to <= a)) {
+            taken.push([from - 4, to + 4, more.y]);
+            return true;
+          }
+        }
+        if (!isFault) label.remove();
+        return isFault;
       };
       labels.replaceChildren();
-      for (const rule of all(".rule").sort((a, b) => (a.dataset.name < b.dataset.name ? -1 : 1))) {
-        const value = Number(rule.getAttribute("d").split(/[M ]/)[1]), before = rule.dataset.name.includes("touch");
-        const more = { y: 0.75 * top, fill: rule.getAttribute("stroke"), "text-anchor": before ? "end" : "start" };
-        if (value >= x[0] && value <= x[1]) add(rule.dataset.name, pixel(value) + (before ? -2 : 2), more, 0, width);
+      // Faults choose first, then the shaded spans.
+      for (const mark of [...all(".fault"), ...all(".shade"), ...all(".rule:not(.fault)")].filter((one) => one.dataset.name)) {
+        const isSpan = mark.tagName === "rect", number = (name) => Number(mark.getAttribute(name));
+        const [low, high] = isSpan ? [number("x"), number("x") + number("width")] : Array(2).fill(pairs(mark.getAttribute("d").slice(1))[0]);
+        if (high < x[0] || low > x[1]) continue;
+        const place = pixel((Math.max(low, x[0]) + Math.min(high, x[1])) / 2);
+        const more = { y: 0.75 * top, fill: isSpan ? "#64748b" : mark.getAttribute("stroke") };
+        add(mark.dataset.name, isSpan ? [[place, "middle"]] : [[place + 2, "start"], [place - 2, "end"]], more, 0, width, mark.matches(".fault"));
       }
       for (const { x: start, width: long, lane, name } of bands) {
         const [low, high] = [Math.max(left, pixel(start)), Math.min(end, pixel(start + long))];
-        const more = { y: top + (lane + 0.5) / -full.y[0] * down + 4, fill: "#1f2937", "text-anchor": "middle" };
+        const middle = [[(low + high) / 2, "middle"]];
+        const more = { y: top + (lane + 0.5) / -full.y[0] * down + 4, fill: "#1f2937" };
         // Where its name has no room, a stage has its number.
-        if (high > low) add(name, (low + high) / 2, more, low, high) || add(parseInt(name) || "", (low + high) / 2, more, low, high);
+        if (high > low) add(name, middle, more, low, high) || add(parseInt(name) || "", middle, more, low, high);
       }
       if (at !== null) show(at);
     }
@@ -140,21 +165,22 @@ const plots = (() => {
       at = t;
       const value = overPosition ? along(track, t) : t - since;
       const place = value === null ? -1 : pixel(value);
-      cursor.setAttribute("d", place >= left && place <= width - right ? `M${place} ${top}V${bottom}` : "");
+      const isInside = place >= left && place <= width - right;
+      cursor.setAttribute("d", isInside ? `M${place} ${top}V${bottom}` : "");
       figure.querySelector("output").textContent = `${(t + 0).toFixed(3)} s`;
       for (const [lane, span] of spans.entries()) {
         const line = lines.find(([name]) => name === span.dataset.name);
-        const number = line && value !== null ? along(line[1], value) : null;
-        const band = bands.find((one) => one.lane === lane && value >= one.x && value <= one.x + one.width);
+        const number = line && isInside ? valueAt(line[0], t) : null;
+        const band = isInside && bands.find((one) => one.lane === lane && value >= one.x && value <= one.x + one.width);
         const second = number !== null && also ? ` (${(number * also[0]).toFixed(3)} ${also[1]})` : "";
-        if (line || band) span.querySelector("b").textContent = band ? band.name : number === null ? "" : number.toFixed(decimals) + second;
+        if (line || lane < lanes) span.querySelector("b").textContent = band ? band.name : number === null ? "" : number.toFixed(decimals) + second;
       }
     }
 
     const self = { figure, clock, zoom, layout, show, range: () => x, full: full.x, middle: () => (at === null || overPosition ? null : at - since) };
-    const key = [[...document.querySelectorAll("[data-clock]")].indexOf(clock), figure.dataset.across, since].join();
-    if (!groups.has(key)) groups.set(key, []);
-    const group = groups.get(key);
+    const axis = [clocks.indexOf(clock), figure.dataset.across, since].join();
+    if (!groups.has(axis)) groups.set(axis, []);
+    const group = groups.get(axis);
     group.push(self);
 
     const pick = (event) => {

@@ -2,7 +2,8 @@
 // times in s; x along the sleeve, y from the outermost wall towards the pillar.
 "use strict";
 
-// The row at time t, each column interpolated; null where one of its neighbours is unknown.
+// The row at time t, each column interpolated; null where one of its neighbours is unknown. Where the
+// load jumps from wall to corner or back, the later row.
 function rowAt(scene, t) {
   const rows = scene.rows;
   let low = 0, high = rows.length - 1;
@@ -12,9 +13,12 @@ function rowAt(scene, t) {
   }
   const a = rows[low], b = rows[high], span = b[0] - a[0];
   const part = span > 0 ? Math.min(1, Math.max(0, (t - a[0]) / span)) : 0;
+  const jumps = ["corner_force_n", "floor_force_n"].map((name) => scene.columns.indexOf(name))
+    .every((i) => (a[i] > 0) !== (b[i] > 0));
   const row = {};
   scene.columns.forEach((name, i) => {
-    row[name] = a[i] === null || b[i] === null ? null : a[i] + part * (b[i] - a[i]);
+    const known = a[i] !== null && b[i] !== null;
+    row[name] = jumps && part > 0 && i > 0 ? b[i] : known ? a[i] + part * (b[i] - a[i]) : null;
   });
   return row;
 }
@@ -28,14 +32,15 @@ function pose(scene, row) {
   const g = scene.geometry;
   const x = row.position_mm, y = g.wall_radius_mm - row.radius_mm;
   const ahead = g.steps.find(([face]) => face > x);
+  // The edge that carries is at most a little behind the axle.
+  const edge = g.steps.find(([face]) => face > (row.corner_force_n > 0 ? x - 0.5 : x));
   const root = ahead && ahead[0] - x < g.wheel_radius_mm ? [ahead[0], wallAt(g, x)] : null;
   const away = root && Math.hypot(root[0] - x, root[1] - y);
   const rise = g.wall_radius_mm - g.arm_pivot_radius_mm - y;
   const run = g.pivot_side * Math.sqrt(Math.max(0, g.arm_length_mm ** 2 - rise ** 2));
   return {
     x, y, floor: wallAt(g, x),
-    // The edge that carries.
-    edge: ahead ? [ahead[0], wallAt(g, ahead[0])] : null,
+    edge: edge ? [edge[0], wallAt(g, edge[0])] : null,
     root: root && away > 0 ? root : null,
     // Point of the undeformed wheel that is next to the root.
     rim: root && away > 0 && [0, 1].map((i) => [x, y][i] + (root[i] - [x, y][i]) * g.wheel_radius_mm / away),
@@ -141,7 +146,7 @@ function start(scene) {
     set("outline", { cx: p.x, cy: -p.y });
 
     arrow("preload", [p.x, p.y + length(row.preload_n)], [p.x, p.y], row.preload_n, scene.measured ? "measured preload" : "preload");
-    label("preloadtext", p.x, p.y + length(row.preload_n) + 1, "middle", small);
+    label("preloadtext", p.x, p.y + Math.max(length(row.preload_n), r) + 1, "middle", small);
     const floor = row.floor_force_n || 0, corner = row.corner_force_n || 0;
     arrow("floor", [p.x, p.floor - length(floor)], [p.x, p.floor], row.floor_force_n, "wall");
     label("floortext", p.x - 2, p.floor - length(floor) - 1.3 * small, "end", small);
@@ -213,7 +218,10 @@ function start(scene) {
     const [a, b] = c ? [Math.min(c.touch_s, c.lift_s), Math.max(c.touch_s, c.lift_s)] : [0, 0];
     [from, to] = c ? [Math.max(first, a - 0.5), Math.min(last, b + 0.8)] : [first, last];
     set("scrub", { min: from, max: to });
-    now = c ? a : from;
+    // It opens where the corner carries.
+    const corner = scene.columns.indexOf("corner_force_n");
+    const carried = c && scene.rows.find((row) => row[0] >= a && row[corner] > 0);
+    now = carried ? carried[0] : c ? a : from;
     draw();
   }
 

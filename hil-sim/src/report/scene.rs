@@ -116,13 +116,6 @@ impl Geometry {
         }
     }
 
-    /// Distance before the face at which the wheel touches the edge of a step: `sqrt(R^2 -
-    /// (R - h - c)^2)`, since the compression c lowers the axle; mm.
-    pub(super) fn touch_mm(&self, step_mm: f64, compression_mm: f64) -> f64 {
-        let r = self.wheel_radius_mm;
-        (r * r - (r - step_mm - compression_mm).powi(2)).sqrt()
-    }
-
     /// Height of the step whose face is nearest to `position_mm`, mm.
     fn step_mm(&self, position_mm: f64) -> f64 {
         let away = |step: &&(f64, f64)| (step.0 - position_mm).abs();
@@ -146,10 +139,6 @@ pub(super) struct Event {
     pub(super) step_mm: f64,
     /// Distance before the face at the first touch, mm.
     pub(super) touch_mm: f64,
-    /// The same by the geometry alone, without compression, mm.
-    pub(super) touch_rigid_mm: f64,
-    /// Compression of the tread at the first touch, mm.
-    pub(super) compression_mm: f64,
     /// Preload at the instant of the gap, N.
     pub(super) preload_n: f64,
     /// Gap, mm: true, or measured where there is no truth.
@@ -185,7 +174,6 @@ impl Scene {
 
 fn event(geometry: &Geometry, rows: &[&Tick], line: &CrossingLine) -> Event {
     let at = rows.partition_point(|row| row.controller.t_s < line.touch_s).min(rows.len() - 1);
-    let compression_mm = rows[at].compression_mm();
     let gap_mm = if line.gap_mm.is_finite() { Some(line.gap_mm) } else { line.gap_measured_mm };
     let gap_mm = gap_mm.unwrap_or(f64::NAN);
     let step_mm = geometry.step_mm(line.step_mm);
@@ -196,8 +184,6 @@ fn event(geometry: &Geometry, rows: &[&Tick], line: &CrossingLine) -> Event {
         face_mm: line.step_mm,
         step_mm,
         touch_mm: line.step_mm - rows[at].position_mm(),
-        touch_rigid_mm: geometry.touch_mm(step_mm, 0.0),
-        compression_mm,
         preload_n: line.preload_n,
         gap_mm,
     }
@@ -212,7 +198,8 @@ fn values(geometry: &Geometry, row: &Tick) -> [f64; COLUMNS.len()] {
     })
 }
 
-/// About [`ROWS`] of the rows at most, dense around the crossings, the first and the last kept.
+/// About [`ROWS`] of the rows at most, dense around the crossings. The first and the last are kept,
+/// and both rows where corner or wall begins or ceases to carry.
 fn thinned<'a>(rows: &[&'a Tick], crossings: &[Event]) -> Vec<&'a Tick> {
     let near = |row: &Tick| {
         let t_s = row.controller.t_s;
@@ -228,7 +215,15 @@ fn thinned<'a>(rows: &[&'a Tick], crossings: &[Event]) -> Vec<&'a Tick> {
             Some(_) => (piece.len(), ROWS_OF_ONE.min(ROWS.0 / crossings.len())),
             None => (far, ROWS.1),
         };
-        kept.extend(piece.iter().step_by(count.div_ceil(most).max(1)));
+        let every = count.div_ceil(most).max(1);
+        let carries =
+            |row: &Tick| row.truth.map(|t| (t.corner_force_n > 0.0, t.floor_force_n > 0.0));
+        let changes = |place: usize| {
+            let near = &piece[place.saturating_sub(1)..piece.len().min(place + 2)];
+            near.iter().any(|row| carries(row) != carries(piece[place]))
+        };
+        let is_kept = |(place, _): &(usize, &&Tick)| place % every == 0 || changes(*place);
+        kept.extend(piece.iter().enumerate().filter(is_kept).map(|(_, row)| row));
     }
     if kept.last().map(|row| row.controller.tick) != rows.last().map(|row| row.controller.tick) {
         kept.extend(rows.last());
@@ -287,13 +282,10 @@ mod tests {
         let scene = Scene::new(&recording).unwrap();
         assert_eq!(scene.crossings.len(), 3);
         for crossing in &scene.crossings {
-            assert!(
-                (crossing.touch_rigid_mm - (25.0_f64.powi(2) - 21.0_f64.powi(2)).sqrt()).abs()
-                    < 1e-9
-            );
-            let touch = scene.geometry.touch_mm(crossing.step_mm, crossing.compression_mm);
-            assert!((crossing.touch_mm - touch).abs() < 0.1, "{crossing:?} {touch}");
-            assert!(crossing.touch_mm > crossing.touch_rigid_mm, "compression touches earlier");
+            // The compression lowers the axle, so that it touches a little earlier.
+            let rigid_mm = crate::plant::wall::touch_mm(25.0, crossing.step_mm);
+            let earlier_mm = crossing.touch_mm - rigid_mm;
+            assert!(earlier_mm > 0.0 && earlier_mm < 0.6, "{crossing:?} {rigid_mm}");
         }
     }
 

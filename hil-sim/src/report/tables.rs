@@ -2,11 +2,9 @@
 //! comparison.
 
 use interstage::model::LimitedBy;
-use serde_json::Value;
 
 use super::svg::escape;
 use crate::record::{CrossingLine, LogLine, Report, Summary};
-use crate::scenario::brief;
 use crate::table::{number, signed};
 
 /// A table as HTML, without a head if that is empty; the cells are HTML already.
@@ -25,13 +23,11 @@ pub(crate) fn table(class: &str, head: &[String], rows: Vec<Vec<String>>) -> Str
 /// The summary as pairs.
 pub(super) fn summary(s: &Summary) -> String {
     let pairs = [
-        ("Completed", if s.completed { "yes" } else { "no" }.to_owned()),
-        ("Target", s.target.clone()),
-        ("Controller", s.controller.clone()),
         ("Direction", s.direction.clone()),
-        ("Rig", s.rig.clone()),
-        ("Seed", s.seed.to_string()),
-        ("From command to arrival", with_unit(s.duration_s, 3, "s")),
+        (
+            if s.completed { "From command to arrival" } else { "From command to end" },
+            with_unit(s.duration_s, 3, "s"),
+        ),
         ("In motion", with_unit(s.moving_s, 3, "s")),
         ("From boot to end", with_unit(s.total_s, 3, "s")),
         ("Travel", with_unit(s.travel_mm, 2, "mm")),
@@ -44,10 +40,6 @@ pub(super) fn summary(s: &Summary) -> String {
         ("Mean preload", with_unit(s.mean_preload_n, 2, "N")),
         ("Drive energy", with_unit(s.energy_j, 3, "J")),
         ("Friction work", with_unit(s.friction_work_j, 3, "J")),
-        (
-            "Real-time factor",
-            if s.measured { String::new() } else { number(s.real_time_factor, 1) },
-        ),
     ];
     let cells: String = pairs
         .iter()
@@ -111,16 +103,6 @@ pub(super) fn reports(s: &Summary) -> String {
     injected + &table("lines", &[], rows.collect())
 }
 
-/// The parameters that differ from the preset's.
-pub(super) fn overrides(s: &Summary) -> String {
-    if s.overrides.is_empty() {
-        return "<p>Every parameter is the preset's.</p>\n".to_owned();
-    }
-    let row = |(key, value): (&String, &Value)| vec![escape(key), escape(&brief(value))];
-    "<p>Different from the preset:</p>\n".to_owned()
-        + &table("lines", &[], s.overrides.iter().map(row).collect())
-}
-
 pub(super) fn log(lines: &[LogLine]) -> String {
     if lines.is_empty() {
         return "<p>The log is empty.</p>\n".to_owned();
@@ -144,41 +126,45 @@ pub(crate) struct Column {
     pub(crate) on_terminal: bool,
 }
 
-/// All of them, after the step's number.
-pub(crate) const COLUMNS: [Column; 13] = {
+impl Column {
     const fn new(
         name: &'static str,
         unit: &'static str,
         decimals: usize,
         of: fn(&CrossingLine) -> Option<f64>,
-    ) -> Column {
-        Column { name, unit, decimals, of, truth: None, on_terminal: true }
+    ) -> Self {
+        Self { name, unit, decimals, of, truth: None, on_terminal: true }
     }
-    const GAP: Option<Truth> = Some((|c| c.gap_mm, gap_error));
-    const STEP: Option<Truth> = Some((|c| c.step_mm, step_error));
-    [
-        new("gap", "mm", 3, |c| Some(c.gap_mm)),
-        Column {
-            truth: GAP,
-            on_terminal: false,
-            ..new("predicted", "mm", 3, |c| c.gap_predicted_mm)
-        },
-        Column { truth: GAP, ..new("measured", "mm", 3, |c| c.gap_measured_mm) },
-        new("speed", "mm/s", 2, |c| Some(c.speed_mm_s)),
-        new("preload", "N", 2, |c| Some(c.preload_n)),
-        Column { on_terminal: false, ..new("peak preload", "N", 2, |c| Some(c.peak_preload_n)) },
-        Column { on_terminal: false, ..new("corner", "N", 1, |c| Some(c.corner_force_n)) },
-        Column { on_terminal: false, ..new("friction used", "", 2, |c| Some(c.peak_utilisation)) },
-        new("lead", "s", 2, |c| c.lead_time_s),
-        Column { on_terminal: false, ..new("slip", "mm", 2, |c| Some(c.slip_mm)) },
-        new("step at", "mm", 2, |c| Some(c.step_mm)),
-        Column { truth: STEP, on_terminal: false, ..new("found at", "mm", 2, |c| c.step_found_mm) },
-        Column {
-            on_terminal: false,
-            ..new("touch to lift", "s", 3, |c| Some((c.lift_s - c.touch_s).abs()))
-        },
-    ]
-};
+
+    /// Compared with the true gap.
+    const fn of_gap(self) -> Self {
+        Self { truth: Some((|c| c.gap_mm, gap_error)), ..self }
+    }
+
+    const fn off_terminal(self) -> Self {
+        Self { on_terminal: false, ..self }
+    }
+}
+
+/// All of them, after the step's number.
+pub(crate) const COLUMNS: [Column; 13] = [
+    Column::new("gap", "mm", 3, |c| Some(c.gap_mm)),
+    Column::new("predicted", "mm", 3, |c| c.gap_predicted_mm).of_gap().off_terminal(),
+    Column::new("measured", "mm", 3, |c| c.gap_measured_mm).of_gap(),
+    Column::new("speed", "mm/s", 2, |c| Some(c.speed_mm_s)),
+    Column::new("preload", "N", 2, |c| Some(c.preload_n)),
+    Column::new("peak preload", "N", 2, |c| Some(c.peak_preload_n)).off_terminal(),
+    Column::new("peak corner", "N", 1, |c| Some(c.corner_force_n)).off_terminal(),
+    Column::new("friction used", "", 2, |c| Some(c.peak_utilisation)).off_terminal(),
+    Column::new("lead", "s", 2, |c| c.lead_time_s),
+    Column::new("slip", "mm", 2, |c| Some(c.slip_mm)).off_terminal(),
+    Column::new("step at", "mm", 2, |c| Some(c.step_mm)),
+    Column {
+        truth: Some((|c| c.step_mm, step_error)),
+        ..Column::new("found at", "mm", 2, |c| c.step_found_mm).off_terminal()
+    },
+    Column::new("touch to lift", "s", 3, |c| Some((c.lift_s - c.touch_s).abs())).off_terminal(),
+];
 
 /// What kept a crossing from being faster, in words.
 pub(crate) fn slowed_by(line: &CrossingLine) -> &'static str {
@@ -221,6 +207,7 @@ mod tests {
     fn what_is_not_known_is_left_out_of_the_summary() {
         let known = Summary { max_gap_mm: 2.5, ..Summary::default() };
         assert!(summary(&known).contains("<dd>2.5000 mm</dd>"), "{}", summary(&known));
+        assert!(summary(&Summary { duration_s: Some(11.0), ..known.clone() }).contains("to end<"));
         let unknown = summary(&Summary { max_gap_mm: f64::NAN, energy_j: f64::NAN, ..known });
         for part in ["Worst gap", "Drive energy", "<dd>-"] {
             assert!(!unknown.contains(part), "{part} in {unknown}");

@@ -46,7 +46,7 @@ pub(crate) fn verdict(summary: &Summary) -> String {
         Grade::Good => "good".to_owned(),
         _ => reservations(summary).join(", "),
     };
-    let slow = summary.lost.as_ref().map(|lost| format!("slow above all because {}", lost.main()));
+    let slow = summary.lost.as_ref().map(|lost| format!("largest loss of time: {}", lost.main()));
     [Some(why).filter(|why| !why.is_empty()), slow]
         .into_iter()
         .flatten()
@@ -135,8 +135,8 @@ pub(crate) fn headline(summary: &Summary) -> String {
         }
         (false, None) if !summary.missing.is_empty() => format!("Log ends after {travel}"),
         (false, None) => {
-            let within = summary.cut_off_s.map(|s| format!(" within {s:.0} s")).unwrap_or_default();
-            format!("Did not complete{within}: {travel}")
+            let end = summary.cut_off_s.map(|s| format!("time-out at {s:.0} s from boot"));
+            format!("Did not complete: {} after {travel}", end.as_deref().unwrap_or("stopped"))
         }
         (false, Some(fault)) => {
             format!("Did not complete: fault {} after {travel}: {}", fault.code, fault.text)
@@ -214,7 +214,7 @@ mod tests {
         (summary.gap_ref_mm, summary.max_gap_mm) = (2.0, 2.059);
         assert_eq!(Grade::of(&summary), Grade::Good);
         assert!(verdict(&summary).starts_with("good: every gap at most 3 % over the reference"));
-        assert!(verdict(&summary).contains("; slow above all because "), "{}", verdict(&summary));
+        assert!(verdict(&summary).contains("; largest loss of time: "), "{}", verdict(&summary));
         summary.max_gap_mm = 2.061;
         assert_eq!(Grade::of(&summary), Grade::Fair);
         assert_eq!(reservations(&summary), ["over the reference gap"]);

@@ -6,7 +6,7 @@ use serde_json::{Map, Value};
 use super::Axis;
 use crate::report::axis;
 use crate::report::palette;
-use crate::report::panel::{Line, Look, Panel, stacked};
+use crate::report::panel::{Line, Look, Marks, Panel, Shape, stacked};
 use crate::scenario::brief;
 
 /// Size of a plot, CSS pixels.
@@ -42,32 +42,65 @@ pub fn picture(axes: &[Axis], rows: &[Map<String, Value>], plots: &[Plot]) -> Op
         parts.collect::<Vec<_>>().join(", ")
     };
     let mut names: Vec<String> = rows.iter().map(group).collect();
-    names.dedup();
     let mut seen = std::collections::HashSet::new();
     names.retain(|name| seen.insert(name.clone()));
     let number = |row: &Map<String, Value>, key: &str| row[key].as_f64().unwrap_or(f64::NAN);
-    let range = axis::extent(rows.iter().map(|row| number(row, &x.key)))?;
+    // A run that did not arrive has no duration.
+    let figure = |row: &Map<String, Value>, key: &str| {
+        let is_none = key == "duration_s" && row["completed"] == false;
+        if is_none { f64::NAN } else { number(row, key) }
+    };
+    let range = axis::padded(axis::extent(rows.iter().map(|row| number(row, &x.key)))?, 0.02);
     let size = (SIZE.0, SIZE.1 * plots.len() as u32);
     // The text lives as long as the process, which ends after the picture.
     let x_name: &'static str = x.key.clone().leak();
+    let dots = |Line { name, look, points }: &Line| Marks {
+        name: name.clone(),
+        shape: Shape::Dot,
+        colour: look.colour(),
+        points: points.clone(),
+    };
     let panel = |plot: &Plot| {
         let line = |(place, name): (usize, &String)| {
             let own = rows.iter().filter(|row| group(row) == *name);
             let mut points: Vec<(f64, f64)> =
-                own.map(|row| (number(row, &x.key), number(row, plot.column))).collect();
+                own.map(|row| (number(row, &x.key), figure(row, plot.column))).collect();
             points.sort_by(|a, b| a.0.total_cmp(&b.0));
             let name = if name.is_empty() { plot.title } else { name };
-            let look = Look::Other(COLOURS[place % COLOURS.len()]);
+            let look = Look::Other(COLOURS[place % COLOURS.len()], 2.0);
             Line { name: name.to_owned().into(), look, points }
         };
+        let lines: Vec<Line> = names.iter().enumerate().map(line).collect();
         Panel {
             title: plot.title.to_owned(),
             y_name: plot.y_name,
             x_name: Some(x_name),
             x: range,
-            lines: names.iter().enumerate().map(line).collect(),
+            // A value between two failed runs has no line.
+            marks: lines.iter().map(dots).collect(),
+            lines,
             ..Panel::default()
         }
     };
     Some(stacked(size, &mut plots.iter().map(panel).collect::<Vec<_>>()))
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    #[test]
+    fn a_run_that_failed_has_no_duration_and_a_lone_value_a_dot() {
+        let axis =
+            Axis { key: "x".to_owned(), values: ["1", "2", "3"].map(str::to_owned).to_vec() };
+        let row = |x: u8, completed: bool| {
+            let row = json!({ "x": x, "completed": completed, "duration_s": x });
+            row.as_object().cloned().unwrap_or_default()
+        };
+        let plot = Plot { column: "duration_s", title: "Duration", y_name: "duration, s" };
+        let svg = picture(&[axis], &[row(1, false), row(2, true), row(3, false)], &[plot]).unwrap();
+        assert!(svg.contains("d=\"M2 2h0\"") && !svg.contains("M1 1"), "{svg}");
+    }
 }

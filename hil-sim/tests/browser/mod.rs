@@ -98,6 +98,8 @@ fn every_plot_shows_the_time_of_the_pointer_and_they_zoom_together() {
     let gap_mm = summary["crossings"][1]["gap_mm"].as_f64().unwrap();
     let shown = gap.as_str().unwrap().split('(').nth(1).unwrap().split(' ').next().unwrap();
     assert!((shown.parse::<f64>().unwrap() - gap_mm).abs() < 0.01, "{gap} instead of {gap_mm} mm");
+    let speeds = "new Set([...document.querySelectorAll('figure[data-of^=speed] [data-name=true] b')].map((b) => b.textContent && Number(b.textContent).toFixed(2)).filter(Boolean)).size";
+    assert_eq!(browser.number(speeds), 1.0, "the plots of one quantity show one value");
 
     // Dragging zooms every plot of the run to the stretch; a double click shows everything again.
     let before = browser.value(RANGES);

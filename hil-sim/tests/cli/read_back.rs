@@ -60,7 +60,7 @@ fn a_captured_log_reports_what_was_measured_and_calls_nothing_true() {
     ends_with(0, at, &["capture", "--seed", "4", "--out", "."]);
     ends_with(0, at, &["deploy", "--seed", "4", "--out", "real"]);
     let output = ends_with(0, at, &["report", "log.mcap", "--out", "page.html"]);
-    let text = stdout(&output);
+    let text = stdout(&output).split_whitespace().collect::<Vec<_>>().join(" ");
     assert!(text.contains("worst measured gap 2."), "{text}");
     assert!(text.contains("the reference of 2.653 mm"), "{text}");
     assert!(text.contains("measured slip"), "{text}");
