@@ -17,6 +17,7 @@ mod rest;
 mod state;
 mod stop;
 
+use Stage::{Board, Drive, Pretightener, Sensors, Stop};
 use serde::{Deserialize, Serialize};
 
 use crate::probe::PortError;
@@ -61,8 +62,7 @@ pub enum Stage {
 
 impl Stage {
     /// Every stage, in its order.
-    pub const ALL: [Self; 5] =
-        [Self::Board, Self::Sensors, Self::Stop, Self::Drive, Self::Pretightener];
+    pub const ALL: [Self; 5] = [Board, Sensors, Stop, Drive, Pretightener];
 
     /// In words.
     pub const fn name(self) -> &'static str {
@@ -98,59 +98,44 @@ const fn info(
 
 /// Every check, in its order.
 pub const CHECKS: &[CheckInfo] = &[
-    info("option bytes", Stage::Board, "reads FLASH_OPTR", "DBANK = 1, as delivered"),
-    info("firmware", Stage::Board, "reads the binary log for 0.5 s", "a tick each millisecond"),
-    info("stop contact", Stage::Board, "reads PB12 and PB7", "both low: closed"),
-    info("readback at rest", Stage::Board, "reads both bridges", "0 % of the supply, 3 % at most"),
-    info("encoder at rest", Stage::Sensors, "counts for 0.5 s", "2 counts at most"),
-    info("preload sensor", Stage::Sensors, "reads it unloaded", "0 N, 3 N at most"),
-    info(
-        "preload noise",
-        Stage::Sensors,
-        "reads it for 0.5 s",
-        "0.2 N at most, standard deviation",
-    ),
-    info("compression sensor", Stage::Sensors, "reads it unloaded", "0 mm, 0.1 mm at most"),
-    info(
-        "compression noise",
-        Stage::Sensors,
-        "reads it for 0.5 s",
-        "0.008 mm at most, standard deviation",
-    ),
-    info("angle sensor", Stage::Sensors, "reads its frames", "sound frames, field in range"),
-    info("angle zero", Stage::Sensors, "compares it with the stow end", "within 40 codes"),
-    info("preload lead", Stage::Sensors, "you unplug the sensor", "below 2 % of the converter"),
-    info("compression lead", Stage::Sensors, "you unplug the sensor", "below 2 % of the converter"),
-    info("self-test", Stage::Sensors, "resets the controller", "idle, zeros taken"),
-    info("stop pressed", Stage::Stop, "you press the emergency stop", "fault 151"),
-    info("stop cuts supply", Stage::Stop, "you look at the supply", "the motors have no supply"),
-    info("held in reset", Stage::Stop, "you hold the board's reset button", "nothing moves"),
-    info("drive bridge", Stage::Drive, "15 % for 0.6 s, its readback", "15 %, the other bridge 0"),
-    info("drive turns", Stage::Drive, "15 % outwards, the encoder", "counts upwards"),
-    info("drive direction", Stage::Drive, "you look at the wheel", "it turns outwards"),
-    info("drive speed", Stage::Drive, "15 % and 30 %", "its parameter, within 25 %"),
-    info("drive friction", Stage::Drive, "the same", "less than 8 % of duty"),
+    info("option bytes", Board, "reads FLASH_OPTR", "DBANK = 1, as delivered"),
+    info("firmware", Board, "reads the binary log for 0.5 s", "a tick each millisecond"),
+    info("stop contact", Board, "reads PB12 and PB7", "both low: closed"),
+    info("readback at rest", Board, "reads both bridges", "0 % of the supply, 3 % at most"),
+    info("encoder at rest", Sensors, "counts for 0.5 s", "2 counts at most"),
+    info("preload sensor", Sensors, "reads it unloaded", "0 N, 3 N at most"),
+    info("preload noise", Sensors, "reads it for 0.5 s", "0.2 N at most, one sigma"),
+    info("compression sensor", Sensors, "reads it unloaded", "0 mm, 0.1 mm at most"),
+    info("compression noise", Sensors, "reads it for 0.5 s", "0.008 mm at most, one sigma"),
+    info("angle sensor", Sensors, "reads its frames", "sound frames, field in range"),
+    info("angle zero", Sensors, "compares it with the stow end", "within 40 codes"),
+    info("preload lead", Sensors, "you unplug the sensor", "below 2 % of the converter"),
+    info("compression lead", Sensors, "you unplug the sensor", "below 2 % of the converter"),
+    info("self-test", Sensors, "resets the controller", "idle, zeros taken"),
+    info("stop pressed", Stop, "you press the emergency stop", "fault 151"),
+    info("stop cuts supply", Stop, "you look at the supply", "the motors have no supply"),
+    info("held in reset", Stop, "you hold the board's reset button", "nothing moves"),
+    info("drive bridge", Drive, "15 % for 0.6 s, readback", "15 %, the other bridge 0"),
+    info("drive turns", Drive, "15 % outwards, the encoder", "counts upwards"),
+    info("drive direction", Drive, "you look at the wheel", "it turns outwards"),
+    info("drive speed", Drive, "15 % and 30 %", "its parameter, within 25 %"),
+    info("drive friction", Drive, "the same", "less than 8 % of duty"),
     info(
         "pre-tightener bridge",
-        Stage::Pretightener,
-        "25 % for 0.55 s, its readback",
+        Pretightener,
+        "25 % for 0.55 s, readback",
         "25 %, the other bridge 0",
     ),
-    info("preload rises", Stage::Pretightener, "the same", "preload and compression rise"),
+    info("preload rises", Pretightener, "the same", "preload and compression rise"),
     info(
         "preload against tread",
-        Stage::Pretightener,
-        "three steps of preload",
+        Pretightener,
+        "three steps",
         "compression grows less than the preload",
     ),
-    info("arm direction", Stage::Pretightener, "the same", "the angle's code grows"),
-    info(
-        "preload scale",
-        Stage::Pretightener,
-        "the same",
-        "as the spring within 25 %, as the tread within 50 %",
-    ),
-    info("preload released", Stage::Pretightener, "backwards until slack", "below 2 N, then idle"),
+    info("arm direction", Pretightener, "the same", "the angle's code grows"),
+    info("preload scale", Pretightener, "the same", "as spring 25 %, as tread 50 %"),
+    info("preload released", Pretightener, "backwards until slack", "below 2 N, then idle"),
 ];
 
 /// A check of this name.

@@ -233,10 +233,8 @@ impl Judge {
             let is = |fault: Fault| code == fault.code();
             lost && (is(Fault::PositionUnknown) || unconfirmed && is(Fault::PlaceUnconfirmed))
         };
-        self.fault.is_some_and(|(_, code)| !honest(code))
-            || [Limit::StepExtra, Limit::StepMissing, Limit::CompressionStrange]
-                .map(limited)
-                .contains(&true)
+        let untrue = [Limit::StepExtra, Limit::StepMissing, Limit::CompressionStrange];
+        self.fault.is_some_and(|(_, code)| !honest(code)) || untrue.into_iter().any(limited)
     }
 
     fn names(&self, code: u16) -> bool {

@@ -6,9 +6,8 @@ use super::record::Record;
 use super::result::Fit;
 use super::{IdentifyError, actuator, contact};
 
-/// Largest shift of logs of one rig, see [`Fit::agree`]: mostly 3 on rigs as identified, but up to
-/// 30 where a fit ends in one of its small minima (2 of 120 rigs); 55 and more between rigs whose
-/// friction differs by a quarter.
+/// Largest shift of logs of one rig, see [`Fit::agree`]: mostly 3, but up to 30 where a fit ends in a
+/// small minimum (2 of 120 rigs); 55 and more between rigs whose friction differs by a quarter.
 const AGREE: f64 = 40.0;
 /// Least deviation of the preload, N: with a supply within 2 %, the slews of two logs of one rig are
 /// up to 4 % apart, which is so much of the 15 N that a run builds up, in the mean of both.
@@ -17,8 +16,7 @@ const DRIFT_N: f64 = 0.3;
 impl Fit {
     /// Refuses logs of several rigs, by contact or by pre-tightener. The square of the shift from
     /// what a log's own fit leaves to what the common fit leaves, in deviations of the own one, is
-    /// about the number of coordinates where noise alone differs. The log that is shifted most is
-    /// named.
+    /// about the number of coordinates where noise alone differs. The one shifted most is named.
     pub(super) fn agree(&self, records: &[Record]) -> Result<(), IdentifyError> {
         if records.len() < 2 {
             return Ok(());

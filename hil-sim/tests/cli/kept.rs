@@ -121,15 +121,15 @@ fn no_command_writes_over_what_it_reads() {
     let set = std::fs::read(at.join("set.bin")).unwrap();
     refused_in(at, &["params", "save", "set.bin", "--file", "set.bin"], &["save set.bin"]);
     assert_eq!(set, std::fs::read(at.join("set.bin")).unwrap());
-    for (scenario, file) in [("own.toml", "own.toml"), ("own.toml", "other.mcap")] {
-        std::fs::write(at.join("own.toml"), "[plant]\nmu = 0.9\n").unwrap();
+    let known = "identified.toml";
+    std::fs::write(at.join(known), "[plant]\nmu = 0.9\n").unwrap();
+    for file in [known, "other.mcap"] {
         let before = std::fs::read(at.join(file)).unwrap();
-        refused_in(at, &["params", "restore", scenario, "--file", file], &[file, "set"]);
+        refused_in(at, &["params", "restore", known, "--file", file], &[file, "set"]);
         assert!(before == std::fs::read(at.join(file)).unwrap(), "{file}");
     }
-    let known = ["identify", "other.mcap", "--scenario", "identified.toml", "--out", "."];
-    std::fs::rename(at.join("own.toml"), at.join("identified.toml")).unwrap();
-    refused_in(at, &known, &["identified.toml", "is read by this command"]);
+    let again = ["identify", "other.mcap", "--scenario", known, "--out", "."];
+    refused_in(at, &again, &[known, "is read by this command"]);
     // A page does not replace what is no page, nor a scenario what is no scenario.
     refused_in(at, &["report", "run", "--out", "run/summary.json"], &["run/summary.json", ".html"]);
     refused_in(at, &["params", "save", "other.mcap", "--file", "set.bin"], &["save other.mcap"]);

@@ -122,12 +122,10 @@ fn logs_of_two_rigs_are_refused_and_the_odd_one_is_named() {
     let odd = log("odd", &["--seed", "4"]);
     refused_in(at, &["identify", &one, &of_one, &odd], &["odd/log.mcap: not of the rig"]);
     refused_in(at, &["identify", &one, &odd], &["not of the rig of the other logs"]);
-    // The same sleeve, less friction.
-    let smooth = log("smooth", &["--set", "plant.mu=0.85"]);
+    // The same sleeve, less friction; the same contact, another pre-tightener.
     let nominal = log("nominal", &[]);
-    // The same contact, another pre-tightener.
-    let quick = log("quick", &["--set", "preload.slew_n_per_s=28"]);
-    for other in [smooth, quick] {
+    for set in ["plant.mu=0.85", "preload.slew_n_per_s=28"] {
+        let other = log("other", &["--set", set]);
         refused_in(at, &["identify", &nominal, &other], &["not of the rig of the other logs"]);
     }
     let output = rig_in(at, &["identify", &one, &of_one]);

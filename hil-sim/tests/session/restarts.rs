@@ -230,9 +230,8 @@ fn from_an_unconfirmed_record_it_takes_no_corner_for_a_wall_and_arrives_by_a_ste
         let (mode, at) = (session.mode(), session.plant().truth().position_mm);
         let end = if then == Direction::Deploy { 80.0 } else { 0.0 };
         let good = match mode {
-            // By a step that is displaced by four sigma at most.
+            // By a step that is displaced by four sigma at most; or no step lay ahead.
             Mode::Complete(_) => (at - end).abs() <= 1.2,
-            // No step lay ahead.
             Mode::FaultHold(Fault::PlaceUnconfirmed) => {
                 (at - end).abs() <= 2.6 && limits.contains(&Limit::PositionUnconfirmed)
             }
@@ -270,9 +269,7 @@ fn assert_returns(session: &mut Session, name: &str) -> Vec<Limit> {
     while matches!(session.mode(), Mode::FaultHold(_)) {
         session.step(Some(Command::Reset)).expect("runs");
     }
-    if session.mode() != Mode::Idle {
-        session.step(Some(Command::Stop)).expect("runs");
-    }
+    session.step(Some(Command::Stop)).expect("runs");
     let limits = finish(session, Direction::Retract);
     let at = session.plant().truth().position_mm;
     assert_eq!(session.mode(), Mode::Complete(Direction::Retract.into()), "{name}: {limits:?}");
