@@ -84,7 +84,7 @@ pub fn animated_svg(recording: &Recording) -> Option<String> {
         })
     };
     for (text, since, until) in [
-        ("It slows before the step; the preload has been raised".to_owned(), f64::MIN, first),
+        ("It slows before the step".to_owned(), f64::MIN, first),
         ("The corner takes over the load".to_owned(), first, last),
         (format!("Step {}, {carries}: {reference}", c.index), last, f64::MAX),
     ] {
