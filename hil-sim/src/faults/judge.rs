@@ -330,6 +330,11 @@ mod tests {
         limited.limits.push((0.1, Limit::StepLate.code()));
         assert_eq!(limited.finding(&[], 1.3, true), Finding::Limited);
         assert_eq!(limited.finding(&[Limit::StepLate.code()], 1.3, true), Finding::Undetected);
+        // After a reset, an end that is not confirmed is honest with its limit alone.
+        let mut lost = Judge { fault: Some((0.1, Fault::PlaceUnconfirmed.code())), ..good };
+        assert!(lost.false_alarm(Kind::Off));
+        lost.limits.push((0.1, Limit::PositionUnconfirmed.code()));
+        assert!(!lost.false_alarm(Kind::Off) && lost.false_alarm(Kind::Recorded));
     }
 
     #[test]

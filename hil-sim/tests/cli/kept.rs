@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use super::{code, json, number, object, refused_in, rig_in, stderr, stdout};
 
-fn good(at: &Path, arguments: &[&str]) -> std::process::Output {
+pub(crate) fn good(at: &Path, arguments: &[&str]) -> std::process::Output {
     let output = rig_in(at, arguments);
     assert_eq!(code(&output), 0, "{arguments:?}: {}", stderr(&output));
     output

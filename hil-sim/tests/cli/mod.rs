@@ -4,7 +4,7 @@ mod campaigns;
 mod crossing;
 mod deploy;
 mod input;
-mod kept;
+pub(crate) mod kept;
 mod logs;
 mod others;
 mod read_back;
