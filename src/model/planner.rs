@@ -215,8 +215,6 @@ impl Planner {
 
     fn scene(&self, request: &PlanRequest, cruise: MillimetresPerSecond) -> Scene {
         let learned = &request.learned;
-        // Under more load than was told, all the preload that there is until a crossing has gripped.
-        let waits = learned.extra_load > Q16::ZERO && learned.grips == Q16::ZERO;
         Scene {
             direction: request.direction,
             load: self.load + learned.extra_load,
@@ -224,7 +222,7 @@ impl Planner {
             scale: learned.scale * (Ratio::ONE + SIGMAS * learned.deviation),
             cruise,
             arm_thrust: self.arm_thrust_at(request),
-            preload: if waits { self.most() } else { request.preload },
+            preload: request.preload,
             most: self.most(),
             reacts: self.strategy == Strategy::Reactive,
             distance: request.distance,

@@ -96,7 +96,15 @@ impl Frame {
         let rows = self.shown().map(|row| row.iter().map(|cell| escape(cell)).collect());
         let rows = table("ledger pairs rows", &heads, rows.collect());
         let grade = if good { "good" } else { "bad" };
-        let printed = escape(text);
+        // Rows of printed tables keep their length; what is said between them wraps.
+        let mut in_table = false;
+        let line = |line: &str| {
+            let is_rule = line.starts_with('\u{2500}');
+            in_table ^= is_rule;
+            let class = if in_table || is_rule { "row" } else { "said" };
+            format!("<span class=\"{class}\">{}</span>", escape(line))
+        };
+        let printed: String = text.lines().map(line).collect();
         let body =
             format!("<section>\n{rows}</section>\n<section>\n<pre>{printed}</pre>\n</section>\n");
         page_of("a campaign", grade, headline, &body)

@@ -219,9 +219,10 @@ impl<O> Found<O> {
         });
         for file in &args.show.table {
             let is_page = file.extension().is_some_and(|ending| ending == "html");
-            // A text that begins with a table has no headline.
-            let said = text.lines().next().filter(|line| !line.starts_with('\u{2500}'));
-            let headline = partial.clone() + said.unwrap_or("Rows of a campaign");
+            // What is said before the first table.
+            let said = text.split('\u{2500}').next().unwrap_or_default().trim().replace('\n', " ");
+            let headline = if said.is_empty() { "Rows of a campaign" } else { &said };
+            let headline = partial.clone() + headline;
             write_text(
                 file,
                 &if is_page { rows.html(&headline, &text, good) } else { rows.csv() },

@@ -86,7 +86,7 @@ const ORACLE: &str = "oracle: the fastest run found for each plant, all of it kn
 
 fn human(comparison: &Comparison, rows: &Frame) -> String {
     let mut text = format!(
-        "{}, each strategy tuned to a worst gap of {:.3} mm within {} %\n{}",
+        "{}, each strategy tuned, where it can be, to a worst gap of {:.3} mm within {} %\n{}",
         counted(comparison.runs, "rig"),
         comparison.gap_ref_mm,
         100.0 * compare::TUNED_WITHIN,

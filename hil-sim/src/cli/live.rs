@@ -100,7 +100,7 @@ pub fn watch(
                 clock.tick(record.at());
             }
             if let Some((topic, body)) = messages(&item) {
-                server.publish(topic, clock.now_ns(), body);
+                server.publish(topic, u64::from(clock.tick) * 1_000_000, body);
             }
         });
         for line in source.news().into_iter().chain(files.iter_mut().flat_map(LogFiles::news)) {
@@ -182,11 +182,6 @@ impl Clock {
             (self.first, self.began) = (Some(tick), Instant::now());
         }
         self.tick = tick;
-    }
-
-    /// Time since boot, ns.
-    fn now_ns(&self) -> u64 {
-        u64::from(self.tick) * 1_000_000
     }
 
     /// Waits for the log's time to have passed.

@@ -130,11 +130,10 @@ fn human(outcome: &montecarlo::Outcome) -> String {
     if outcome.limits.is_empty() {
         text += "  no limit was met\n";
     }
-    let seed = outcome.incomplete.first().copied().or(outcome.worst_gap_seed);
-    if let Some(seed) = seed {
-        text += &format!(
-            "`cargo rig deploy --seed {seed}` with the same options shows that run in full\n"
-        );
+    let incomplete = outcome.incomplete.first().map(|seed| (*seed, "an incomplete run"));
+    let widest = outcome.worst_gap_seed.map(|seed| (seed, "the run with the worst gap"));
+    if let Some((seed, run)) = incomplete.or(widest) {
+        text += &format!("`cargo rig deploy --seed {seed}`, same options, shows {run} in full\n");
     }
     text
 }

@@ -167,7 +167,7 @@ fn titled(mut runs: Vec<(String, &Recording)>) -> Vec<(String, &Recording)> {
     let kinds: BTreeSet<&String> = runs.iter().map(|(_, run)| &run.summary.controller).collect();
     if kinds.len() == runs.len() {
         for (name, run) in &mut runs {
-            *name = format!("{} preload", run.summary.controller);
+            *name = format!("{} strategy", run.summary.controller);
         }
     }
     runs

@@ -43,8 +43,9 @@ pub fn run(summary: &Summary, files: &[PathBuf], all: bool) -> String {
 /// One of two runs that are compared, by its letter and its log: outcome, verdict and origin.
 pub fn one_of_two(letter: char, log: &str, summary: &Summary) -> String {
     let headline = wrapped(&format!("{letter}: {}", headline(summary)), "", WIDTH);
-    let parts = [verdict(summary), gap_sentence(summary), origin(summary), log.to_owned()];
-    let parts: Vec<String> = parts.into_iter().filter(|part| !part.is_empty()).collect();
+    let mut parts = vec![verdict(summary), gap_sentence(summary), slip_sentence(summary)];
+    parts.extend([origin(summary), log.to_owned()]);
+    parts.retain(|part| !part.is_empty());
     painted(&headline, Grade::of(summary), is_coloured()) + &wrapped(&parts.join("; "), "  ", WIDTH)
 }
 

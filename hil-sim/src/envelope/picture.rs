@@ -76,7 +76,13 @@ fn map(
     let (head, body) = area.split_vertically(HEAD);
     let part = envelope.area(controller);
     let (what, part) = if known { ("known", part.known) } else { ("unknown", part.unknown) };
-    let title = format!("{}, {what}: {:.0} % of the grid", controller.name(), 100.0 * part);
+    let own = |cell: &&Cell| cell.known == known && cell.controller == controller;
+    let all = envelope.frictions.len() * envelope.loads_n.len();
+    let of = match envelope.cells.iter().filter(own).count() {
+        done if done < all => format!("{done} of {all} places"),
+        _ => "the grid".to_owned(),
+    };
+    let title = format!("{}, {what}: {:.0} % of {of}", controller.name(), 100.0 * part);
     let style = font(13.0, palette::TRUTH, HPos::Left, VPos::Center);
     head.draw(&Text::new(title, (46 * S, HEAD / 2), style))?;
     let (frictions, loads) = (&envelope.frictions, &envelope.loads_n);
@@ -100,7 +106,6 @@ fn map(
         .x_desc("friction")
         .y_desc("load, N")
         .draw()?;
-    let own = |cell: &&Cell| cell.known == known && cell.controller == controller;
     for cell in envelope.cells.iter().filter(own) {
         let (fx, fy) = (cell.friction, cell.load_n);
         let (colour, text) = match (cell.good(), cell.completed) {

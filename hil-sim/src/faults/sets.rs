@@ -21,7 +21,7 @@ pub const SAVED: &str = "saved";
 /// Number of the active set, which is in the first slot.
 const SEQUENCE: u32 = 7;
 /// Bits before a set in its slot.
-const PREFIX_BITS: u32 = 2 * 8 * WORD_BYTES as u32;
+pub const PREFIX_BITS: u32 = 2 * 8 * WORD_BYTES as u32;
 /// Additional preload of the others, N.
 const MORE_N: f64 = 1.0 / 64.0;
 
@@ -53,11 +53,6 @@ pub fn places(scenario: &Scenario) -> Result<Vec<u8>, CompileError> {
 /// Bits of a set of this many bytes, and of its seal and length where it is stored.
 pub const fn bits(length: usize, stored: bool) -> u32 {
     8 * length as u32 + if stored { PREFIX_BITS } else { 0 }
-}
-
-/// Bits of seal and length alone, which come first.
-pub const fn seal_bits() -> u32 {
-    PREFIX_BITS
 }
 
 /// Operations of the flash in a save of this many bytes: it erases, writes the set, its length

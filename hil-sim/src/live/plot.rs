@@ -57,7 +57,7 @@ pub(super) const PLOTS: [Plot; 6] = [
         title: "speed, mm/s",
         least: 2.0,
         curves: &[
-            ("wanted", Color::Gray, Look::Line, |row| row.seen.speed_ref_mm_s),
+            ("wanted", Color::Reset, Look::Line, |row| row.seen.speed_ref_mm_s),
             ("measured", Color::Cyan, Look::Line, |row| row.seen.wheel_speed_mm_s),
         ],
     },
@@ -65,15 +65,15 @@ pub(super) const PLOTS: [Plot; 6] = [
         title: "preload, N",
         least: 4.0,
         curves: &[
-            ("wanted", Color::Gray, Look::Line, |row| row.seen.preload_ref_n),
-            ("measured", Color::Yellow, Look::Line, |row| row.seen.preload_n),
+            ("wanted", Color::Reset, Look::Line, |row| row.seen.preload_ref_n),
+            ("measured", Color::Blue, Look::Line, |row| row.seen.preload_n),
         ],
     },
     Plot {
         title: "gap, mm",
         least: 1.5,
         curves: &[
-            ("wanted", Color::Gray, Look::Line, |row| row.gap_ref_mm),
+            ("wanted", Color::Reset, Look::Line, |row| row.gap_ref_mm),
             ("clearance", Color::Magenta, Look::Dots, |row| row.clearance_mm),
             ("measured", Color::LightRed, Look::Marks, |row| row.gap_mm),
         ],

@@ -28,7 +28,8 @@ const LINES: usize = 64;
 const WIDE: (u16, u16) = (120, 36);
 
 /// The last line: what the keys do.
-const KEYS: &str = " s start   SPACE or x stop   r retract   0 reset   q quit: the drive runs on ";
+const KEYS: &str =
+    " s start   SPACE or x stop   r retract   0 reset   q quit: a real drive runs on ";
 
 /// What the log is compared with.
 pub struct Known {
@@ -215,7 +216,7 @@ fn colour(entry: &Entry) -> Color {
     match entry.event {
         Event::Fault(_) => Color::Red,
         Event::Restart(restart) if restart.reset != Reset::Power => Color::Red,
-        Event::Limit(_) | Event::Lost(_) | Event::Refused(_) => Color::Yellow,
+        Event::Limit(_) | Event::Lost(_) | Event::Refused(_) => Color::Magenta,
         Event::Crossing(_) => Color::Cyan,
         _ => Color::Reset,
     }
@@ -270,7 +271,7 @@ mod tests {
             "mode: deployed",
             " s──",
             "SPACE or x stop",
-            "the drive runs on",
+            "a real drive runs on",
         ];
         let wide =
             ["wheel centre to axis, mm ─by the arm", "slip margin ─estimated", "crossing 3 at"];

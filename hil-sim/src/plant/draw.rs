@@ -128,11 +128,6 @@ impl Draw {
     fn offset(&mut self, half_width: f64) -> f64 {
         half_width * (2.0 * self.0.random::<f64>() - 1.0)
     }
-
-    /// A number from 0 to this.
-    fn up_to(&mut self, most: f64) -> f64 {
-        most * self.0.random::<f64>()
-    }
 }
 
 impl PlantParameters {
@@ -187,7 +182,7 @@ impl PlantParameters {
         let lag_s = rig.preload.lag_s * draw.factor(spread.lag_rel);
         let slew_n_per_s = rig.preload.slew_n_per_s * draw.factor(spread.slew_rel);
         let radius_mm = rig.rig.wheel_radius_mm + draw.offset(spread.wheel_radius_mm)
-            - draw.up_to(spread.wear_mm);
+            - spread.wear_mm * draw.0.random::<f64>();
         let preload_sensor_gain = draw.factor(spread.preload_sensor_gain_rel);
         let tread_gain = draw.factor(spread.compression_sensor_gain_rel);
         let angle_zero_rad = draw.offset(spread.arm_angle_zero_deg).to_radians();

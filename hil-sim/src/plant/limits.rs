@@ -95,7 +95,7 @@ impl PlantParameters {
                 format!(
                     "plant.mu = {mu:.2} on a corner that leans by {tangent:.2} drags a wheel down \
                      that is braked, and plant.moved_mass_kg = {mass_kg:.3} at {speed_mm_s:.0} mm/s \
-                     brings {energy_mj:.0} mJ, of which the tread takes at most {most_mj:.0} mJ"
+                     brings {energy_mj:.2} mJ, of which the tread takes at most {most_mj:.2} mJ"
                 ),
             );
         }

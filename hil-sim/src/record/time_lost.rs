@@ -12,7 +12,7 @@ pub struct TimeLost {
     /// Nothing lost: the travel, at cruise speed.
     #[serde(default)]
     pub cruise_s: f64,
-    /// At rest, until the first preload suffices.
+    /// At rest, until the preload carries the wheel.
     pub preload_s: f64,
     /// Before the steps: acceleration at the start, waiting for the preload, the window in which
     /// the step may come.
@@ -27,9 +27,9 @@ impl TimeLost {
     /// The parts beside the travel, with what each is.
     fn parts(&self) -> [(f64, &'static str); 4] {
         [
-            (self.preload_s, "until the first preload suffices"),
+            (self.preload_s, "until the preload carries the wheel"),
             (self.approach_s, "before the steps"),
-            (self.crossing_s, "from the touch until the wheel is fast again"),
+            (self.crossing_s, "on the steps, from the touch until the wheel is fast again"),
             (self.end_s, "behind the last step"),
         ]
     }
@@ -150,7 +150,7 @@ mod tests {
         }
         let lost = split.lost(10.0);
         assert!(lost.sentence().starts_with("17.000 s = 7.300 s for the travel"), "{lost:?}");
-        assert_eq!(lost.main(), "3.70 s from the touch until the wheel is fast again");
+        assert!(lost.main().starts_with("3.70 s on the steps, from the touch"));
         let run = crate::report::example::deploy().summary;
         let (lost_by_run, duration_s) = (run.lost.unwrap(), run.duration_s.unwrap());
         assert!(lost_by_run.sentence().starts_with(&format!("{duration_s:.3} s = ")));

@@ -75,28 +75,25 @@ pub fn animated_svg(recording: &Recording) -> Option<String> {
     };
     let gap_x = animate("animate attributeName=\"x2\"", &|t| format!("{:.3}", rim(t).0));
     let gap_y = animate("animate attributeName=\"y2\"", &|t| format!("{:.3}", rim(t).1));
-    let (mut words, mut named) = (String::new(), String::new());
+    let mut words = String::new();
     let reference = format!("gap {:.2} mm, reference {:.2} mm", c.gap_mm, scene.gap_ref_mm);
     let carries = if scene.retracts { "the lower wall carries" } else { "lift-off" };
-    let shown = |since: f64, until: f64| {
+    let shown = |when: &dyn Fn(f64) -> bool| {
         animate("animate attributeName=\"opacity\" calcMode=\"discrete\"", &|t| {
-            u8::from((since..until).contains(&t)).to_string()
+            u8::from(when(t)).to_string()
         })
     };
+    let named = shown(&|t| rim(t) != (0.0, 0.0));
     for (text, since, until) in [
         ("It slows before the step".to_owned(), f64::MIN, first),
         ("The corner takes over the load".to_owned(), first, last),
         (format!("Step {}, {carries}: {reference}", c.index), last, f64::MAX),
     ] {
-        let opacity = shown(since, until);
+        let opacity = shown(&|t| (since..until).contains(&t));
         let _ = writeln!(
             words,
             "<text x=\"20\" y=\"27\" font-size=\"17\" opacity=\"0\">{text}{opacity}</text>"
         );
-    }
-    for (name, since, until) in [("clearance", f64::MIN, last), ("gap", last, f64::MAX)] {
-        let opacity = shown(since, until);
-        let _ = write!(named, "<text x=\"0.4\" y=\"1.2\" opacity=\"0\">{name}{opacity}</text>");
     }
     let view = view(recording, line, AROUND_S);
     let (mut plots, mut down) = (String::new(), PLOTS);
@@ -137,7 +134,7 @@ font-family=\"sans-serif\" fill=\"#1f2937\">\n<title>A crossing of a simulated r
 <g stroke=\"{preload}\" stroke-width=\"1\" fill=\"none\"><line y2=\"0\">{tail}</line><path d=\"M-1.4 -2.4L0 0L1.4 -2.4\"/></g>\
 <text x=\"2\" y=\"-5\" font-size=\"3\">preload</text></g></svg>\n\
 <svg {CORNER}><rect x=\"-11\" y=\"-15\" width=\"16\" height=\"20\" fill=\"#f4f5f7\"/><use href=\"#crossing\"/>\
-<g font-size=\"0.95\"><g fill=\"{gap}\">{named}</g>\
+<g font-size=\"0.95\"><text x=\"0.4\" y=\"1.2\" fill=\"{gap}\">clearance{named}</text>\
 <text x=\"-3\" y=\"1.3\" text-anchor=\"end\" fill=\"#287c3c\">reference gap</text></g></svg>\n\
 {words}{plots}</svg>\n",
         SIZE.0,

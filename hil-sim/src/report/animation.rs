@@ -18,7 +18,7 @@ drawn.</p>\n"
     };
     let mut html = why(scene);
     if scene.crossings.is_empty() {
-        html += "<p>No step was crossed.</p>\n";
+        html += "<p>No crossing is complete in the log.</p>\n";
     }
     html += STAGE;
     html += &format!("<p class=\"note\">{}</p>\n", legend(scene));
@@ -58,13 +58,9 @@ fn at_the_steps(scene: &Scene) -> String {
     let cruise_n = number(scene.geometry.cruise_n, 1);
     let at =
         scene.crossings.iter().map(|c| format!("{} N at step {}", number(c.preload_n, 1), c.index));
-    match at.collect::<Vec<_>>().join(", ") {
-        at if at.is_empty() => format!("Without a step {cruise_n} N are wanted."),
-        at => format!(
-            "Here it was {at}. Without a step {cruise_n} N are wanted; between steps too close to \
-             fall and rise again it stays up."
-        ),
-    }
+    let at = at.collect::<Vec<_>>().join(", ");
+    let here = if at.is_empty() { at } else { format!("Here it was {at}. ") };
+    format!("{here}Without a step {cruise_n} N are wanted.")
 }
 
 fn legend(scene: &Scene) -> String {

@@ -51,8 +51,10 @@ pub(super) fn panel(view: &View) -> Panel {
             let colour = palette::rgb(lane.colours[usize::from(value) % lane.colours.len()]);
             Stretch { from, to, name: (lane.show)(value), colour }
         };
-        let all = spans(view, lane.of).into_iter().map(stretch);
-        (lane.name, all.filter(|one| one.to > view.x.0 && one.from < view.x.1).collect())
+        // What is too short to be seen has no place in the legend either.
+        let least = 1e-3 * (view.x.1 - view.x.0);
+        let seen = |one: &Stretch| one.to.min(view.x.1) - one.from.max(view.x.0) > least;
+        (lane.name, spans(view, lane.of).into_iter().map(stretch).filter(seen).collect())
     };
     let (shades, rules) = Default::default();
     let bands = LANES.iter().map(band).collect();

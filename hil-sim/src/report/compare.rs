@@ -178,7 +178,7 @@ fn panels(runs: &[(&str, &Recording)]) -> Vec<Panel> {
         ..views[0].panel(title, y_name)
     };
     let mut preload = panel("Preload", "preload, N", &|row| row.controller.preload_n);
-    preload.levels = views[0].limit_n.iter().map(|&n| ("limit", Look::Limit, n)).collect();
+    preload.levels = views[0].limit_n.iter().map(|&n| ("preload limit", Look::Limit, n)).collect();
     let speed = panel("Speed", "speed, mm/s", &|row| {
         row.known(|t| t.speed_true_mm_s, |c| c.wheel_speed_mm_s)
     });

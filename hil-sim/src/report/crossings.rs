@@ -15,7 +15,7 @@ const SIZE: (u32, u32) = (540, 250);
 pub(super) fn html(recording: &Recording) -> String {
     let crossings = &recording.summary.crossings;
     if crossings.is_empty() {
-        return "<p>No step was crossed.</p>\n".to_owned();
+        return "<p>No crossing is complete in the log.</p>\n".to_owned();
     }
     crossings.iter().map(|line| one(recording, line)).collect()
 }
@@ -79,7 +79,7 @@ mod tests {
         recording.rows.clear();
         assert_eq!(html(&recording).matches("No rows were recorded").count(), 3);
         recording.summary.crossings.clear();
-        assert!(html(&recording).contains("No step was crossed"));
+        assert!(html(&recording).contains("No crossing is complete"));
     }
 
     #[test]

@@ -182,7 +182,7 @@ impl<'a> View<'a> {
             self.line("measured", Look::Measured(palette::PRELOAD), |row| row.controller.preload_n),
             self.line("true", Look::Truth, |row| row.of_truth(|t| t.preload_true_n)),
         ];
-        let levels = self.limit_n.iter().map(|&n| ("limit", Look::Limit, n)).collect();
+        let levels = self.limit_n.iter().map(|&n| ("preload limit", Look::Limit, n)).collect();
         Panel { least_span: 4.0, lines, levels, ..self.panel("Preload", "preload, N") }
     }
 

@@ -58,7 +58,7 @@ fn with_unit(value: impl Into<Option<f64>>, decimals: usize, unit: &str) -> Stri
 
 pub(super) fn ledger(crossings: &[CrossingLine]) -> String {
     if crossings.is_empty() {
-        return "<p>No step was crossed.</p>\n".to_owned();
+        return "<p>No crossing is complete in the log.</p>\n".to_owned();
     }
     let names = COLUMNS.iter().map(|column| format!("{}<br>{}", column.name, column.unit));
     let head = std::iter::once("step".to_owned()).chain(names).chain(["slowed<br>by".to_owned()]);

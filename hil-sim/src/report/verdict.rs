@@ -116,7 +116,8 @@ pub(crate) fn origin(summary: &Summary) -> String {
 /// The headline: the outcome of the run.
 pub(crate) fn headline(summary: &Summary) -> String {
     let verb = if summary.direction == "retract" { "Retracted" } else { "Deployed" };
-    let crossings = counted(summary.crossings.len(), "crossing");
+    let begun = if summary.completed { "" } else { " begun" };
+    let crossings = counted(summary.crossings.len(), "crossing") + begun;
     let moving = format!("{:.2} s in motion", summary.moving_s);
     let time = summary.duration_s.map_or(moving.clone(), |duration_s| {
         format!("{duration_s:.2} s from the command ({moving})")

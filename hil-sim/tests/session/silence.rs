@@ -105,17 +105,6 @@ fn adversarial_rigs_are_hardly_ever_wrong_in_silence() {
     }
 }
 
-/// A load that the drive shows is not taken for a stiff tread.
-#[test]
-fn with_an_unknown_load_no_other_strategy_is_faster() {
-    for weight in ["3.3", "5", "6.7", "8.3"] {
-        let set = format!("mismatch.weight_n={weight}");
-        let ours = duration_s(&[&set], Direction::Deploy);
-        let limit = duration_s(&[&set, "run.controller=limit"], Direction::Deploy);
-        assert!(ours <= 1.03 * limit, "{weight} N: {ours} s, limit {limit} s");
-    }
-}
-
 /// What the first gaps show is learned in both directions.
 #[test]
 fn a_tread_that_relaxes_faster_than_known_is_crossed_faster() {

@@ -147,7 +147,7 @@ impl Case {
         let set = set_of(if stored { sets::KEPT } else { "prototype" }, &base.rig).ok()?;
         let number = match entry.kind {
             Kind::BitErrors if stored && instant % 4 == 1 => {
-                random.random_range(0..sets::seal_bits())
+                random.random_range(0..sets::PREFIX_BITS)
             }
             Kind::BitErrors | Kind::TwoWrongBits => {
                 random.random_range(0..sets::bits(set.len(), stored))
