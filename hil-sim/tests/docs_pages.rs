@@ -236,6 +236,7 @@ fn the_results_are_those_of_the_figures() {
 
 /// The figure behind a word of a printed summary.
 fn figure(text: &str, before: &str) -> Option<f64> {
+    let text = text.split_whitespace().collect::<Vec<_>>().join(" ");
     text.split_once(before)?.1.split_whitespace().next()?.trim_end_matches(',').parse().ok()
 }
 

@@ -66,7 +66,7 @@ fn details(s: &Summary) -> String {
     let mut parts = vec![verdict(s), gap_sentence(s), slip_sentence(s), origin(s)];
     parts.retain(|part| !part.is_empty());
     if !s.measured {
-        parts.push(format!("{:.0} times real time", s.real_time_factor));
+        parts.push(format!("simulated at {:.0} times real time", s.real_time_factor));
     }
     parts.join("; ")
 }

@@ -17,7 +17,7 @@ pub struct TimeLost {
     /// Before the steps: acceleration at the start, waiting for the preload, the window in which
     /// the step may come.
     pub approach_s: f64,
-    /// From the touch until the wheel is fast again.
+    /// From the touch until the wheel rolls on the next wall.
     pub crossing_s: f64,
     /// Behind the last step: braking for the end of travel.
     pub end_s: f64,
@@ -29,7 +29,7 @@ impl TimeLost {
         [
             (self.preload_s, "until the preload carries the wheel"),
             (self.approach_s, "before the steps"),
-            (self.crossing_s, "on the steps, from the touch until the wheel is fast again"),
+            (self.crossing_s, "on the steps, from the touch until the next wall carries"),
             (self.end_s, "behind the last step"),
         ]
     }

@@ -87,7 +87,8 @@ pub fn animated_svg(recording: &Recording) -> Option<String> {
     for (text, since, until) in [
         ("It slows before the step".to_owned(), f64::MIN, first),
         ("The corner takes over the load".to_owned(), first, last),
-        (format!("Step {}, {carries}: {reference}", c.index), last, f64::MAX),
+        (format!("Step {}, {carries}: {reference}", c.index), last, last.next_up()),
+        (format!("Over the corner; {carries}: {reference}"), last.next_up(), f64::MAX),
     ] {
         let opacity = shown(&|t| (since..until).contains(&t));
         let _ = writeln!(

@@ -108,7 +108,7 @@ fn still(g: &Geometry, c: &Event, (x, y): (f64, f64), title: &str, gap: Option<f
     if cx < -0.5 {
         marks += &format!(
             "<path class=\"measure\" d=\"M{cx:.2},{cy:.2}V5M0,0V5M{cx:.2},3.5H0\"/>\n\
-<text x=\"{:.2}\" y=\"9\" text-anchor=\"middle\">{:.1} mm</text>\n",
+<text x=\"{:.2}\" y=\"9\" text-anchor=\"middle\">{:.1} mm to the face</text>\n",
             0.5 * cx,
             cx.abs(),
         );
@@ -145,7 +145,7 @@ mod tests {
     fn the_pictures_say_where_the_corner_touches() {
         let scene = Scene::new(&example::deploy()).unwrap();
         let html = html(Some(&scene));
-        assert!(html.contains(">13.8 mm</text>"), "{html}");
+        assert!(html.contains(">13.8 mm to the face</text>"), "{html}");
         for c in &scene.crossings {
             assert!(html.contains(&format!("{:.1} N at step {}", c.preload_n, c.index)), "{html}");
         }

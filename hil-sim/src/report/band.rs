@@ -11,7 +11,7 @@ const STAGES: [&str; 6] = [
     "preload rises at rest",
     "both walls carry",
     "corner carries",
-    "onto the next wall",
+    "over the corner",
     "rolls on a wall",
 ];
 

@@ -116,13 +116,15 @@ pub(crate) fn origin(summary: &Summary) -> String {
 /// The headline: the outcome of the run.
 pub(crate) fn headline(summary: &Summary) -> String {
     let verb = if summary.direction == "retract" { "Retracted" } else { "Deployed" };
-    let begun = if summary.completed { "" } else { " begun" };
-    let crossings = counted(summary.crossings.len(), "crossing") + begun;
     let moving = format!("{:.2} s in motion", summary.moving_s);
     let time = summary.duration_s.map_or(moving.clone(), |duration_s| {
         format!("{duration_s:.2} s from the command ({moving})")
     });
-    let travel = format!("{:.1} mm in {time}, {crossings}", summary.travel_mm);
+    let mut travel = format!("{:.1} mm in {time}", summary.travel_mm);
+    // Of a run that ended on a corner the last one is none.
+    if summary.completed {
+        travel += &format!(", {}", counted(summary.crossings.len(), "crossing"));
+    }
     match (summary.completed, summary.faults.first()) {
         (true, None) => {
             let then = summary.restart.as_ref().map(|cause| format!("; then a restart: {cause}"));
