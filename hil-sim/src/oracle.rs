@@ -74,11 +74,11 @@ pub struct Bounds {
 }
 
 impl Bounds {
-    /// What this run kept; of a run that did not complete, the reference gap and no slip.
-    pub fn of(line: &RunLine, gap_ref_mm: f64) -> Self {
+    /// Gap of this run, the reference if it did not complete, and `wanted` or its own lower margin.
+    pub fn of(line: &RunLine, gap_ref_mm: f64, wanted: f64) -> Self {
         let kept = line.least_slip_margin.filter(|_| line.completed).zip(Some(line.max_gap_mm));
         let (slip_margin, gap_mm) = kept.unwrap_or((0.0, gap_ref_mm));
-        Self { gap_mm, slip_margin: slip_margin.max(0.0) }
+        Self { gap_mm, slip_margin: slip_margin.clamp(0.0, wanted) }
     }
 }
 
@@ -281,8 +281,8 @@ mod tests {
             least_slip_margin: Some(0.3),
             ..RunLine::default()
         };
-        assert_eq!(Bounds::of(&line, 2.6), Bounds { gap_mm: 2.4, slip_margin: 0.3 });
+        assert_eq!(Bounds::of(&line, 2.6, 0.1), Bounds { gap_mm: 2.4, slip_margin: 0.1 });
         line.completed = false;
-        assert_eq!(Bounds::of(&line, 2.6), Bounds { gap_mm: 2.6, slip_margin: 0.0 });
+        assert_eq!(Bounds::of(&line, 2.6, 0.1), Bounds { gap_mm: 2.6, slip_margin: 0.0 });
     }
 }

@@ -16,8 +16,8 @@ use crate::table::{counted, number, width, wrapped};
 /// Every strategy rolls while the preload builds, brakes late and has the same friction check.
 /// The reserve below the reference gap of each is tuned until its worst gap over all rigs is
 /// the reference; then the times are comparable. The oracle knows each plant in advance and
-/// has the same actuators; it keeps the worst gap and the least slip margin of the scheduled
-/// run on that plant. A rig takes about 5 s of one core with the oracle, 0.2 s without.
+/// has the same actuators; it keeps the worst gap of the scheduled run on
+/// that plant, and the demanded slip margin. A rig takes about 5 s of one core with the oracle, 0.2 s without.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
     /// How many rigs: the seeds that follow --seed.
@@ -82,7 +82,7 @@ const LEGEND: &str = "command: from the accepted command to arrival (moving: in 
     gap the planner aims.";
 /// What the oracle is.
 const ORACLE: &str = "oracle: the fastest run found for each plant, all of it known in advance, \
-    with the same actuators, at the worst gap and slip margin of the scheduled run there";
+    with the same actuators, at the worst gap of the scheduled run there, with the demanded slip margin";
 
 fn human(comparison: &Comparison, rows: &Frame) -> String {
     let mut text = format!(
