@@ -157,10 +157,9 @@ mod tests {
             text.contains("a, <b>") && text.contains("1.23 ") && text.contains("yes"),
             "{text}"
         );
-        let page = frame.html("5 runs", "a > b", true);
-        for part in
-            ["<th>gap, mm</th>", "<td>a, &lt;b&gt;</td>", "<td>1.23</td>", "<td>-</td>", "a &gt; b"]
-        {
+        let page = frame.html("5 runs", "a > b\n\u{2500}\n 1\n\u{2500}\n", true);
+        let cells = ["<th>gap, mm</th>", "<td>a, &lt;b&gt;</td>", "<td>1.23</td>", "<td>-</td>"];
+        for part in cells.into_iter().chain(["said\">a &gt; b<", "row\"> 1<"]) {
             assert!(page.contains(part), "{part}: {page}");
         }
     }

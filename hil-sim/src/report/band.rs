@@ -82,12 +82,12 @@ mod tests {
             let controller = Controller { t_s, mode, ..Controller::default() };
             Tick { controller, truth: None }
         };
-        let rows = vec![row(0.0, 5), row(1.0, 5), row(2.0, 6), row(3.0, 7)];
+        let rows = vec![row(0.0, 5), row(1.0, 5), row(2.0, 6), row(3.0, 7), row(3.002, 7)];
         let recording = Recording { rows, ..Recording::default() };
         let view = View::new(&recording, Across::Time);
         assert_eq!(
             spans(&view, |row| row.controller.mode),
-            [(0.0, 2.0, 5), (2.0, 3.0, 6), (3.0, 3.0, 7)]
+            [(0.0, 2.0, 5), (2.0, 3.0, 6), (3.0, 3.002, 7)]
         );
         let modes = panel(&view).bands.swap_remove(0).1;
         let names: Vec<&str> = modes.iter().map(|one| one.name.as_str()).collect();
