@@ -74,7 +74,7 @@ pub struct Bounds {
 }
 
 impl Bounds {
-    /// Gap of this run, the reference if it did not complete, and `wanted` or its own lower margin.
+    /// Its gap, or the reference if it did not complete; the `wanted` margin, or its own if less.
     pub fn of(line: &RunLine, gap_ref_mm: f64, wanted: f64) -> Self {
         let kept = line.least_slip_margin.filter(|_| line.completed).zip(Some(line.max_gap_mm));
         let (slip_margin, gap_mm) = kept.unwrap_or((0.0, gap_ref_mm));

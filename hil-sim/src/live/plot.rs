@@ -66,7 +66,7 @@ pub(super) const PLOTS: [Plot; 6] = [
         least: 4.0,
         curves: &[
             ("wanted", Color::Reset, Look::Line, |row| row.seen.preload_ref_n),
-            ("measured", Color::Blue, Look::Line, |row| row.seen.preload_n),
+            ("measured", Color::Magenta, Look::Line, |row| row.seen.preload_n),
         ],
     },
     Plot {
