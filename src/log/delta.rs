@@ -12,15 +12,15 @@ use crate::supervise::codes;
 use crate::tick::Telemetry;
 use crate::units::{Duty, Q16};
 
-/// Fields of a record coded as differences, after the tick: the ages, and the quantities of
+/// Fields of a record coded as differences: the tick, the ages, and the quantities of
 /// [`Telemetry`].
-const NUMBERS: usize = 1 + Telemetry::QUANTITIES;
+const NUMBERS: usize = 2 + Telemetry::QUANTITIES;
 
 /// Words of a record that are copied.
 const WORDS: usize = 6;
 
 /// Bits of the map before those of the words.
-const DIFFERENCES: usize = 2 * (1 + NUMBERS);
+const DIFFERENCES: usize = 2 * NUMBERS;
 
 const MAP: usize = (DIFFERENCES + WORDS).div_ceil(32) * 4;
 
@@ -29,13 +29,12 @@ const _: () = assert!(MAP <= 8, "the map is kept in a u64");
 /// A record as integers. Differences wrap, so that no bit is lost between any two records.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct DeltaRecord {
-    pub(super) at: u32,
     numbers: [u32; NUMBERS],
     words: [u32; WORDS],
 }
 
 /// Most bytes that a [`DeltaRecord`] takes.
-pub(super) const LONGEST: usize = MAP + 4 * (1 + NUMBERS + WORDS);
+pub(super) const LONGEST: usize = MAP + 4 * (NUMBERS + WORDS);
 
 const fn word(low: u16, high: u16) -> u32 {
     low as u32 | (high as u32) << 16
@@ -47,7 +46,12 @@ const fn halves(word: u32) -> [u16; 2] {
 
 impl DeltaRecord {
     /// Zeros: the first record of a frame is coded as the difference from them.
-    pub(super) const ZERO: Self = Self { at: 0, numbers: [0; NUMBERS], words: [0; WORDS] };
+    pub(super) const ZERO: Self = Self { numbers: [0; NUMBERS], words: [0; WORDS] };
+
+    /// The tick.
+    pub(super) const fn at(&self) -> u32 {
+        self.numbers[0]
+    }
 
     /// The record as numbers.
     pub(super) fn of(record: &Record) -> Self {
@@ -55,15 +59,15 @@ impl DeltaRecord {
         let [wheel, preload_sensor, compression_sensor, arm] = codes;
         let [wheel_age, preload_sensor_age, compression_sensor_age, arm_age] = *ages;
         let mut numbers = [0; NUMBERS];
-        let (first, quantities) = numbers.split_at_mut(1);
+        let [at, ages, quantities @ ..] = &mut numbers;
+        *at = t.at;
         // The arm's age lowest: it changes in every tick, as the arm is read every second one.
-        first[0] =
+        *ages =
             u32::from_le_bytes([arm_age, wheel_age, preload_sensor_age, compression_sensor_age]);
         for (number, quantity) in quantities.iter_mut().zip(t.quantities()) {
             *number = quantity.to_bits() as u32;
         }
         Self {
-            at: t.at,
             numbers,
             words: [
                 word(*wheel, *preload_sensor),
@@ -78,7 +82,7 @@ impl DeltaRecord {
 
     /// The record of the integers; none if one of them has no meaning.
     pub(super) fn record(&self) -> Option<Record> {
-        let [ages, quantities @ ..] = self.numbers;
+        let [at, ages, quantities @ ..] = self.numbers;
         let [wheel_and_cell, tread_and_arm, bridges, duties, state, flags] = self.words;
         let [arm_age, wheel_age, preload_sensor_age, compression_sensor_age] = ages.to_le_bytes();
         let [level, stage, mode, rest] = state.to_le_bytes();
@@ -87,15 +91,8 @@ impl DeltaRecord {
         let [drive, pretightener] = halves(duties).map(|half| Duty::from_bits(half as i16));
         let (mode, stage) = (codes::mode(mode)?, codes::stage(stage)?);
         (rest == 0).then_some(())?;
-        let state = Telemetry {
-            at: self.at,
-            mode,
-            stage,
-            level,
-            drive,
-            pretightener,
-            ..Telemetry::default()
-        };
+        let state =
+            Telemetry { at, mode, stage, level, drive, pretightener, ..Telemetry::default() };
         Some(Record {
             telemetry: state.with_quantities(quantities.map(|bits| Q16::from_bits(bits as i32))),
             codes: [wheel, preload_sensor, compression_sensor, arm],
@@ -108,9 +105,9 @@ impl DeltaRecord {
     /// Writes the difference from `before`, and replaces that; returns the bytes written.
     pub(super) fn put(&self, before: &mut Self, room: &mut [u8; LONGEST]) -> usize {
         let mut list = List { map: 0, used: MAP, room };
-        list.number(0, self.at, before.at.wrapping_add(1));
+        before.numbers[0] = before.at().wrapping_add(1);
         for (place, (number, before)) in self.numbers.iter().zip(&before.numbers).enumerate() {
-            list.number(1 + place, *number, *before);
+            list.number(place, *number, *before);
         }
         for (place, (word, before)) in self.words.iter().zip(&before.words).enumerate() {
             if word != before {
@@ -130,9 +127,8 @@ impl DeltaRecord {
         map[..MAP].copy_from_slice(start);
         let map = u64::from_le_bytes(map);
         let mut delta = *before;
-        delta.at = delta.at.wrapping_add(1);
-        let numbers = core::iter::once(&mut delta.at).chain(&mut delta.numbers);
-        for (place, number) in numbers.enumerate() {
+        delta.numbers[0] = delta.at().wrapping_add(1);
+        for (place, number) in delta.numbers.iter_mut().enumerate() {
             let difference = match map >> (2 * place) & 3 {
                 0 => 0,
                 1 => i32::from(i16::from_le_bytes(*take(&mut rest)?)),

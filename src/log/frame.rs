@@ -232,13 +232,9 @@ impl<'a> Frame<'a> {
     }
 }
 
-fn take<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Result<(T, &'a [u8]), FrameError> {
-    postcard::take_from_bytes(bytes).map_err(|_| FrameError::Content)
-}
-
 fn complete<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Result<T, FrameError> {
-    match take(bytes)? {
-        (value, []) => Ok(value),
+    match postcard::take_from_bytes(bytes) {
+        Ok((value, [])) => Ok(value),
         _ => Err(FrameError::Content),
     }
 }
@@ -291,7 +287,7 @@ impl TicksFrame {
 
     /// The latest tick.
     pub(super) const fn latest(&self) -> Tick {
-        self.before.at
+        self.before.at()
     }
 
     /// Adds a record; false if there might be no room.

@@ -50,11 +50,7 @@ impl Identity {
 /// As much of a text as fits.
 pub fn text(from: &str) -> Text {
     let mut text = Text::new();
-    for letter in from.chars() {
-        if text.push(letter).is_err() {
-            break;
-        }
-    }
+    let _ = from.chars().try_for_each(|letter| text.push(letter));
     text
 }
 

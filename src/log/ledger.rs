@@ -39,9 +39,8 @@ pub struct Line {
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Ledger {
     count: u16,
-    /// Dip of the crossing in progress, and of the one whose line is due.
+    /// Dip of the latest corner.
     dip: MillimetresPerSecond,
-    due: MillimetresPerSecond,
     on_corner: bool,
     scale: Option<Ratio>,
     trend: Ratio,
@@ -50,14 +49,7 @@ pub struct Ledger {
 impl Ledger {
     /// A ledger without lines.
     pub const fn new() -> Self {
-        Self {
-            count: 0,
-            dip: Q16::ZERO,
-            due: Q16::ZERO,
-            on_corner: false,
-            scale: None,
-            trend: Q16::ZERO,
-        }
+        Self { count: 0, dip: Q16::ZERO, on_corner: false, scale: None, trend: Q16::ZERO }
     }
 
     /// Takes one tick into account.
@@ -73,7 +65,6 @@ impl Ledger {
                 self.dip = Q16::ZERO;
             }
             self.dip = self.dip.max(seen.speed_ref.abs() - seen.speed.abs());
-            self.due = self.dip;
         }
         self.on_corner = on_corner;
     }
@@ -91,7 +82,7 @@ impl Ledger {
             at,
             count: self.count,
             crossing: *crossing,
-            speed_dip: self.due,
+            speed_dip: self.dip,
             slip: ahead,
             gap_residual: crossing.gap_measured - crossing.gap_predicted,
             trend: self.trend,

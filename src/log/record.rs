@@ -105,15 +105,14 @@ impl Flags {
 impl Record {
     /// The record of a tick.
     pub fn of(input: &Input, output: &Output) -> Self {
-        let SensorFrame { wheel_encoder, preload_sensor, compression_sensor, arm_angle, bridges } =
-            &input.sensors;
+        let Input { now, sensors: from, .. } = input;
         let sensors = [
-            pack(input.now, wheel_encoder.as_ref(), EncoderCount::get),
-            pack(input.now, preload_sensor.as_ref(), AdcCode::get),
-            pack(input.now, compression_sensor.as_ref(), AdcCode::get),
-            pack(input.now, arm_angle.as_ref(), AngleFrame::get),
+            pack(*now, from.wheel_encoder, EncoderCount::get),
+            pack(*now, from.preload_sensor, AdcCode::get),
+            pack(*now, from.compression_sensor, AdcCode::get),
+            pack(*now, from.arm_angle, AngleFrame::get),
         ];
-        let bridges = bridges.unwrap_or_default();
+        let bridges = from.bridges.unwrap_or_default();
         Self {
             telemetry: output.telemetry,
             codes: sensors.map(|(code, _)| code),
@@ -131,30 +130,31 @@ impl Record {
     /// The codes with their times. For a code older than 245 ticks that is the time in the
     /// tick `before`.
     pub fn sensors(&self, before: &SensorFrame) -> SensorFrame {
-        let [wheel, preload_sensor, compression_sensor, arm] = [0, 1, 2, 3].map(|sensor| {
-            let taken = match self.ages[sensor] {
-                NEVER => return None,
-                OLD => None,
-                age => Some(self.at().wrapping_add(NOW).wrapping_sub(u32::from(age))),
-            };
-            Some((self.codes[sensor], taken))
-        });
-        let oldest = self.at().wrapping_add(NOW).wrapping_sub(u32::from(OLD));
         SensorFrame {
-            wheel_encoder: unpack(wheel, before.wheel_encoder, EncoderCount::new, oldest),
-            preload_sensor: unpack(preload_sensor, before.preload_sensor, AdcCode::new, oldest),
-            compression_sensor: unpack(
-                compression_sensor,
-                before.compression_sensor,
-                AdcCode::new,
-                oldest,
-            ),
-            arm_angle: unpack(arm, before.arm_angle, AngleFrame::new, oldest),
+            wheel_encoder: self.sample(0, before.wheel_encoder, EncoderCount::new),
+            preload_sensor: self.sample(1, before.preload_sensor, AdcCode::new),
+            compression_sensor: self.sample(2, before.compression_sensor, AdcCode::new),
+            arm_angle: self.sample(3, before.arm_angle, AngleFrame::new),
             bridges: self.flags.has(Flags::READBACK).then(|| {
                 let [drive, pretightener] = self.bridges.map(BridgeCode::new);
                 BridgeCodes { drive, pretightener }
             }),
         }
+    }
+
+    fn sample<T>(
+        &self,
+        sensor: usize,
+        before: Option<Sample<T>>,
+        code: fn(u16) -> T,
+    ) -> Option<Sample<T>> {
+        let taken = |age: u8| self.at().wrapping_add(NOW).wrapping_sub(age.into());
+        let at = match self.ages[sensor] {
+            NEVER => return None,
+            OLD => before.map_or(taken(OLD), |sample| sample.at),
+            age => taken(age),
+        };
+        Some(Sample { code: code(self.codes[sensor]), at })
     }
 
     /// Input of the tick except the plan and the service mode's duties; `before` as for
@@ -184,21 +184,10 @@ impl Record {
 }
 
 /// Code and coded age of a sample.
-fn pack<T: Copy>(now: Tick, sample: Option<&Sample<T>>, code: impl Fn(T) -> u16) -> (u16, u8) {
+fn pack<T>(now: Tick, sample: Option<Sample<T>>, code: fn(T) -> u16) -> (u16, u8) {
     let Some(sample) = sample else { return (0, NEVER) };
     let age = now.wrapping_sub(sample.at).wrapping_add(NOW);
     (code(sample.code), if age < u32::from(OLD) { age as u8 } else { OLD })
-}
-
-fn unpack<T>(
-    packed: Option<(u16, Option<Tick>)>,
-    before: Option<Sample<T>>,
-    code: impl Fn(u16) -> T,
-    oldest: Tick,
-) -> Option<Sample<T>> {
-    let (bits, taken) = packed?;
-    let at = taken.or(before.map(|sample| sample.at)).unwrap_or(oldest);
-    Some(Sample { code: code(bits), at })
 }
 
 #[cfg(test)]

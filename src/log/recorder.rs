@@ -41,6 +41,7 @@ impl SnapshotRecorder {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::estimate::PositionConfidence::{Guess, Sure, Unsure};
     use crate::fault::Fault;
     use crate::supervise::Leg;
     use crate::units::Direction;
@@ -52,32 +53,23 @@ mod tests {
         let zeros = Zeros { preload: Q16::from_num(3), compression: Q16::ZERO };
         let mut row =
             Telemetry { at: 5, level: 2, position: Q16::from_num(41), ..Telemetry::default() };
-        assert_eq!(
-            recorder.snapshot(&row, PositionConfidence::Sure, MissedCheckIns::NOBODY, zeros).mode(),
-            Some(Mode::Boot)
-        );
+        let mut snapshot =
+            |row: &_, confidence| recorder.snapshot(row, confidence, MissedCheckIns::TICK, zeros);
+        assert_eq!(snapshot(&row, Sure).mode(), Some(Mode::Boot));
         row.mode = Mode::Run(Direction::Deploy, Leg::Crossing);
-        let snapshot =
-            recorder.snapshot(&row, PositionConfidence::Sure, MissedCheckIns::TICK, zeros);
-        assert_eq!((snapshot.mode(), snapshot.fault), (Some(row.mode), 0));
-        assert_eq!((snapshot.tick, snapshot.level, snapshot.position), (5, 2, row.position));
-        assert_eq!(snapshot.missed, MissedCheckIns::TICK);
-        assert!(snapshot.packed_speed.placed());
-        assert_eq!(snapshot.packed_zeros.zeros(), zeros);
-        let unsure =
-            recorder.snapshot(&row, PositionConfidence::Unsure, MissedCheckIns::TICK, zeros);
-        assert_eq!(unsure, DriveSnapshot { level: DriveSnapshot::UNSURE | 2, ..snapshot });
+        let crossing = snapshot(&row, Sure);
+        assert_eq!((crossing.mode(), crossing.fault), (Some(row.mode), 0));
+        assert_eq!((crossing.tick, crossing.level, crossing.position), (5, 2, row.position));
+        assert_eq!(crossing.missed, MissedCheckIns::TICK);
+        assert!(crossing.packed_speed.placed());
+        assert_eq!(crossing.packed_zeros.zeros(), zeros);
+        let unsure = DriveSnapshot { level: DriveSnapshot::UNSURE | 2, ..crossing };
+        assert_eq!(snapshot(&row, Unsure), unsure);
         row.mode = Mode::FaultHold(Fault::DriveStalled);
-        assert_eq!(
-            recorder
-                .snapshot(&row, PositionConfidence::Guess, MissedCheckIns::NOBODY, zeros)
-                .mode(),
-            Some(row.mode)
-        );
+        assert_eq!(snapshot(&row, Guess).mode(), Some(row.mode));
         row.mode = Mode::Idle;
-        let snapshot =
-            recorder.snapshot(&row, PositionConfidence::Guess, MissedCheckIns::NOBODY, zeros);
-        assert!(!snapshot.packed_speed.placed());
-        assert_eq!((snapshot.mode(), snapshot.fault), (Some(Mode::Idle), 122));
+        let idle = snapshot(&row, Guess);
+        assert!(!idle.packed_speed.placed());
+        assert_eq!((idle.mode(), idle.fault), (Some(Mode::Idle), 122));
     }
 }
