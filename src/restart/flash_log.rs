@@ -9,21 +9,17 @@
 //! three double words takes a quarter of that, and finding its place a tenth.
 
 use super::page::{PAGE_WORDS, Page, Word, used, word};
-use crate::restart::{DriveSnapshot, SNAPSHOT_WORDS};
+use crate::restart::DriveSnapshot;
 
 /// Double words of an entry.
 const ENTRY_WORDS: usize = 4;
-
-/// Entries of a page.
-const ENTRIES: usize = PAGE_WORDS / ENTRY_WORDS;
 
 /// Programmed over the last double word of an entry that has been reported.
 pub const TAKEN: Word = [0; 2];
 
 /// First double word of the next entry; none if the page is full.
 pub fn free(page: &Page) -> Option<usize> {
-    let next = used(page, ENTRY_WORDS);
-    (next < ENTRIES).then_some(next * ENTRY_WORDS)
+    Some(used(page, ENTRY_WORDS)).filter(|next| *next < PAGE_WORDS)
 }
 
 /// Double words of a snapshot.
@@ -44,19 +40,13 @@ pub struct Latest {
 /// The last entry, unless it has been reported. If it was torn, the one before it counts, if
 /// that has not been reported either.
 pub fn latest(page: &Page) -> Option<Latest> {
-    let last = used(page, ENTRY_WORDS).checked_sub(1)?;
-    let mark = |entry: usize| (entry + 1) * ENTRY_WORDS - 1;
+    let mark = used(page, ENTRY_WORDS).checked_sub(1)?;
     // A torn mark does not count: better reported twice than not at all.
-    let untaken = |entry: &usize| word(page, mark(*entry)) != TAKEN;
-    let entries = last.saturating_sub(1)..=last;
-    let snapshot = |entry: usize| {
-        let mut words = [0; SNAPSHOT_WORDS];
-        let found = (entry * ENTRY_WORDS..mark(entry)).flat_map(|index| word(page, index));
-        words.iter_mut().zip(found).for_each(|(to, from)| *to = from);
-        DriveSnapshot::open(&words)
+    let untaken = |mark: &usize| word(page, *mark) != TAKEN;
+    let snapshot = |mark: usize| {
+        let words = [3, 2, 1].map(|before| word(page, mark - before));
+        DriveSnapshot::open(words.as_flattened().try_into().ok()?)
     };
-    untaken(&last).then(|| Latest {
-        mark: mark(last),
-        snapshot: entries.rev().take_while(untaken).find_map(snapshot),
-    })
+    let marks = [Some(mark), mark.checked_sub(ENTRY_WORDS)].into_iter().flatten();
+    untaken(&mark).then(|| Latest { mark, snapshot: marks.take_while(untaken).find_map(snapshot) })
 }

@@ -26,32 +26,22 @@ pub fn sum_on(sum: u32, words: &[u32]) -> u32 {
 
 /// Entry of an image with this checksum.
 pub fn entry(id: [u8; 8], sum: u32) -> [Word; ENTRY_WORDS] {
-    let [low, high] = halves(id);
-    [[low, high], [sum, !sum]]
+    let id = u64::from_le_bytes(id);
+    [[id as u32, (id >> 32) as u32], [sum, !sum]]
 }
 
 /// First double word of the next entry; none if the page is full.
 pub fn free(page: &Page) -> Option<usize> {
-    let next = used(page, ENTRY_WORDS) * ENTRY_WORDS;
-    (next < PAGE_WORDS).then_some(next)
+    Some(used(page, ENTRY_WORDS)).filter(|next| *next < PAGE_WORDS)
 }
 
 /// Checksum of the image of this hash at its first start; none if it has not run here. A hash
 /// with one or two flipped bits is the same image: a damaged one would pass for new.
 pub fn sum_of(page: &Page, id: [u8; 8]) -> Option<u32> {
-    let own = number(halves(id));
+    let [[own_low, own_high], _] = entry(id, 0);
     (0..PAGE_WORDS).step_by(ENTRY_WORDS).find_map(|index| {
-        let [sum, complement] = word(page, index + 1);
-        let known = (number(word(page, index)) ^ own).count_ones() <= 2;
-        (known && complement == !sum).then_some(sum)
+        let ([low, high], [sum, complement]) = (word(page, index), word(page, index + 1));
+        let flipped = (low ^ own_low).count_ones() + (high ^ own_high).count_ones();
+        (flipped <= 2 && complement == !sum).then_some(sum)
     })
-}
-
-fn halves(id: [u8; 8]) -> Word {
-    let [a, b, c, d, e, f, g, h] = id;
-    [u32::from_le_bytes([a, b, c, d]), u32::from_le_bytes([e, f, g, h])]
-}
-
-const fn number([low, high]: Word) -> u64 {
-    (high as u64) << 32 | low as u64
 }

@@ -27,11 +27,14 @@ pub(super) fn word(page: &Page, index: usize) -> Word {
     [half(at).unwrap_or(u32::MAX), half(at.saturating_add(4)).unwrap_or(u32::MAX)]
 }
 
-/// Number of entries of so many double words in use: all up to the last that is not blank.
+/// Double words of the entries in use, of so many each: all up to the last that is not blank.
 #[inline(never)]
 pub(super) fn used(page: &Page, words: usize) -> usize {
     let blank = |index: usize| word(page, index) == [u32::MAX; 2];
-    (0..PAGE_WORDS).rev().find(|index| !blank(*index)).map_or(0, |index| index / words + 1)
+    (0..PAGE_WORDS)
+        .rev()
+        .find(|index| !blank(*index))
+        .map_or(0, |index| (index / words + 1) * words)
 }
 
 #[cfg(test)]

@@ -175,9 +175,6 @@ impl DriveSnapshot {
 
 /// The later of two.
 pub fn later(one: Option<DriveSnapshot>, other: Option<DriveSnapshot>) -> Option<DriveSnapshot> {
-    match (one, other) {
-        (Some(a), Some(b)) if b.tick.wrapping_sub(a.tick) as i32 > 0 => Some(b),
-        (Some(a), _) => Some(a),
-        (None, b) => b,
-    }
+    let later = |a: &DriveSnapshot, b: &DriveSnapshot| b.tick.wrapping_sub(a.tick) as i32 > 0;
+    one.into_iter().chain(other).reduce(|a, b| if later(&a, &b) { b } else { a })
 }

@@ -14,17 +14,22 @@ fn put(page: &mut Page, index: usize, [low, high]: Word) {
     page[at + 4..at + 8].copy_from_slice(&high.to_le_bytes());
 }
 
+/// Puts double words one behind the other.
+fn put_all(page: &mut Page, first: usize, words: impl IntoIterator<Item = Word>) {
+    for (index, word) in (first..).zip(words) {
+        put(page, index, word);
+    }
+}
+
 fn snapshot(tick: u32) -> DriveSnapshot {
-    let packed_speed = PackedSpeed::of(q16(8 << 16), true);
-    let position = Q16::from_num(f64::from(tick) * 0.008);
     DriveSnapshot {
         tick,
-        position,
+        position: Q16::from_num(f64::from(tick) * 0.008),
         mode: 7,
         level: 1,
         fault: 0,
         missed: MissedCheckIns::NOBODY,
-        packed_speed,
+        packed_speed: PackedSpeed::of(q16(8 << 16), true),
         packed_zeros: PackedZeros::default(),
     }
 }
@@ -32,9 +37,7 @@ fn snapshot(tick: u32) -> DriveSnapshot {
 /// Writes a record, of which only so many double words come through.
 fn write(page: &mut Page, snapshot: &DriveSnapshot, words: usize) {
     let first = flash_log::free(page).expect("room");
-    for (index, word) in flash_log::words(snapshot).into_iter().take(words).enumerate() {
-        put(page, first + index, word);
-    }
+    put_all(page, first, flash_log::words(snapshot).into_iter().take(words));
 }
 
 #[test]
@@ -110,9 +113,7 @@ fn an_image_is_known_by_its_first_start() {
     assert_eq!(image_checksum::sum_of(&page, images[0].0), None);
     for (id, sum) in images {
         let first = image_checksum::free(&page).expect("room");
-        for (index, word) in image_checksum::entry(id, sum).into_iter().enumerate() {
-            put(&mut page, first + index, word);
-        }
+        put_all(&mut page, first, image_checksum::entry(id, sum));
     }
     for (id, sum) in images {
         assert_eq!(image_checksum::sum_of(&page, id), Some(sum));
@@ -133,9 +134,7 @@ fn a_page_of_seals_fills_up() {
     let mut page = BLANK;
     for image in 0..128_u8 {
         let first = image_checksum::free(&page).expect("room");
-        for (index, word) in image_checksum::entry([image; 8], 1).into_iter().enumerate() {
-            put(&mut page, first + index, word);
-        }
+        put_all(&mut page, first, image_checksum::entry([image; 8], 1));
     }
     assert_eq!(image_checksum::free(&page), None);
 }
@@ -149,9 +148,7 @@ proptest! {
         other in 0_usize..64,
     ) {
         let mut page = BLANK;
-        for (index, word) in image_checksum::entry(id, sum).into_iter().enumerate() {
-            put(&mut page, index, word);
-        }
+        put_all(&mut page, 0, image_checksum::entry(id, sum));
         let mut turned = id;
         turned[bit / 8] ^= 1 << (bit % 8);
         prop_assert_eq!(image_checksum::sum_of(&page, turned), Some(sum));
@@ -165,9 +162,7 @@ proptest! {
     #[test]
     fn a_bit_of_a_sum_is_no_other_sum(id: [u8; 8], sum: u32, bit in 0_usize..64) {
         let mut page = BLANK;
-        for (index, word) in image_checksum::entry(id, sum).into_iter().enumerate() {
-            put(&mut page, index, word);
-        }
+        put_all(&mut page, 0, image_checksum::entry(id, sum));
         page[8 + bit / 8] ^= 1 << (bit % 8);
         prop_assert_eq!(image_checksum::sum_of(&page, id), None);
     }
