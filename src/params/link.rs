@@ -34,14 +34,13 @@ const CHECK: usize = 4;
 /// The frame of a message; none if it is longer than [`LONGEST`], which no message of this
 /// module is.
 pub fn frame(message: &impl Serialize) -> Option<Frame> {
-    let mut plain = [0; LONGEST];
-    let length = postcard::to_slice(message, plain.get_mut(..LONGEST - CHECK)?).ok()?.len();
-    let sum = crc32(plain.get(..length)?).to_le_bytes();
-    plain.get_mut(length..length + CHECK)?.copy_from_slice(&sum);
-    let plain = plain.get(..length + CHECK)?;
+    let mut room = [0; LONGEST - CHECK];
+    let content = postcard::to_slice(message, &mut room).ok()?;
+    let mut plain = Frame::from_slice(content).ok()?;
+    plain.extend_from_slice(&crc32(content).to_le_bytes()).ok()?;
     let mut coded = Frame::new();
     coded.resize(cobs::max_encoding_length(plain.len()).min(LONGEST), 0).ok()?;
-    let length = cobs::try_encode(plain, &mut coded).ok()?;
+    let length = cobs::try_encode(&plain, &mut coded).ok()?;
     coded.truncate(length);
     coded.push(0).ok()?;
     Some(coded)
@@ -115,7 +114,6 @@ mod tests {
         let down = ToBoard::Parameters(u16::MAX, Request::Append(piece.clone()));
         let coded = frame(&down).expect("fits");
         assert_eq!(gathered::<ToBoard>(&coded), (vec![down], 0));
-        let name = "n".repeat(MAX_NAME);
         for response in [
             Response::Piece(piece),
             Response::Description(Description {
@@ -123,7 +121,7 @@ mod tests {
                 length: u16::MAX,
                 schema: u16::MAX,
                 expected: u16::MAX,
-                name: heapless::String::try_from(name.as_str()).unwrap(),
+                name: "n".repeat(MAX_NAME).parse().unwrap(),
                 parameters: u32::MAX,
                 running: u32::MAX,
             }),

@@ -242,6 +242,11 @@ mod tests {
         compile(name, rig).expect("a sound rig").to_vec()
     }
 
+    /// This content with its check.
+    fn signed(content: &[u8]) -> Vec<u8> {
+        [content, &crc32(content).to_le_bytes()].concat()
+    }
+
     #[test]
     fn what_was_compiled_is_read_back_to_the_bit() {
         for (name, rig) in [("prototype", Rig::prototype()), ("fe", Rig::fe())] {
@@ -273,9 +278,7 @@ mod tests {
     fn a_set_of_another_layout_is_refused_by_number() {
         let mut bytes = set("a", &Rig::prototype());
         bytes[0] = SCHEMA as u8 + 1;
-        let end = bytes.len() - CHECK;
-        let sum = crc32(&bytes[..end]).to_le_bytes();
-        bytes[end..].copy_from_slice(&sum);
+        let bytes = signed(&bytes[..bytes.len() - CHECK]);
         assert_eq!(ParameterSet::open(&bytes), Err(SetError::Schema { found: SCHEMA + 1 }));
         let old = ParameterSet::open_any(&bytes).unwrap();
         assert_eq!(old.header().name.as_str(), "a");
@@ -284,11 +287,8 @@ mod tests {
 
     #[test]
     fn constants_with_more_behind_them_are_not_a_set() {
-        let mut bytes = set("a", &Rig::prototype());
-        bytes.truncate(bytes.len() - CHECK);
-        bytes.push(0);
-        let sum = crc32(&bytes).to_le_bytes();
-        bytes.extend(sum);
+        let bytes = set("a", &Rig::prototype());
+        let bytes = signed(&[&bytes[..bytes.len() - CHECK], &[0]].concat());
         let set = ParameterSet::open(&bytes).unwrap();
         let rest = set.read_controller(&mut Controller::default()).unwrap();
         assert_eq!(rest.read_planner(&mut Planner::default()), Err(SetError::Content));

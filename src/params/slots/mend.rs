@@ -36,12 +36,10 @@ pub async fn mend(memory: &mut impl SetMemory) -> Result<(), Refusal> {
 async fn save_again(memory: &mut impl SetMemory, slot: Slot, length: usize) -> Result<(), Refusal> {
     let mut draft = Draft::begin(memory, length).await?;
     while draft.missing() > 0 {
-        let from = super::PREFIX + length - draft.missing();
-        let part = draft.missing().min(WORD_BYTES);
-        let mut word = [0xFF; WORD_BYTES];
-        let bytes = memory.bytes(slot).get(from..from + part).ok_or(Refusal::Length)?;
-        word.iter_mut().zip(bytes).for_each(|(to, byte)| *to = *byte);
-        draft.append(memory, word.get(..part).unwrap_or_default()).await?;
+        let end = super::PREFIX + length;
+        let rest = memory.bytes(slot).get(end - draft.missing()..end).ok_or(Refusal::Length)?;
+        let word: heapless::Vec<u8, WORD_BYTES> = rest.iter().copied().take(WORD_BYTES).collect();
+        draft.append(memory, &word).await?;
     }
     draft.seal(memory).await
 }
