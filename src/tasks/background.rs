@@ -52,9 +52,9 @@ pub async fn operator(mut source: impl CommandSource, exchange: &Exchange) -> ! 
             let mut next = pin!(source.next());
             loop {
                 exchange.liveness.check_in(task, uptime());
-                match select(next.as_mut(), Timer::at(mid_tick_deadline(ROUND))).await {
-                    Either::First(command) => break command,
-                    Either::Second(()) => {}
+                let wait = with_deadline(mid_tick_deadline(ROUND), next.as_mut());
+                if let Ok(command) = wait.await {
+                    break command;
                 }
             }
         };

@@ -40,13 +40,11 @@ impl CycleCount {
     /// What a line of the log shows, if one is due.
     pub(super) fn due(&self, at_rest: bool) -> Option<TickCycles> {
         let interval = if at_rest { AT_REST } else { UNDER_WAY };
-        let ticks = self.ticks.load(Ordering::Relaxed);
-        if ticks < interval {
+        if self.ticks.load(Ordering::Relaxed) < interval {
             return None;
         }
-        self.ticks.store(0, Ordering::Relaxed);
-        let (sum, most) = (&self.sum, &self.most);
-        let (sum, most) = (sum.swap(0, Ordering::Relaxed), most.swap(0, Ordering::Relaxed));
+        let all = [&self.ticks, &self.sum, &self.most];
+        let [ticks, sum, most] = all.map(|number| number.swap(0, Ordering::Relaxed));
         Some(TickCycles { mean: sum / ticks.max(1), most })
     }
 }

@@ -30,7 +30,7 @@ pub const COMMANDS: usize = 4;
 const RECORDS: usize = 8;
 
 /// The latest value of something, which nobody waits for.
-type Latest<T> = Watch<Raw, T, 0>;
+pub(super) type Latest<T> = Watch<Raw, T, 0>;
 
 /// Room for one value, see [`replace`]. Unlike a `Signal`'s its empty state is all zeros, so that
 /// the exchange takes no room in flash.
@@ -177,7 +177,14 @@ impl Exchange {
 
     /// What the light shows, as of the latest tick.
     pub fn light(&self) -> Light {
-        self.telemetry().map_or(Light::Off, |row| light_of(row.mode))
+        use Mode::{
+            Boot, Complete, FaultHold, Idle, Preload, Run, SelfTest, Service, Stopping, Zero,
+        };
+        match self.telemetry().map(|row| row.mode) {
+            None | Some(Boot | SelfTest | Zero | Idle | Complete(_)) => Light::Off,
+            Some(Preload(_) | Run(..) | Stopping(_) | Service) => Light::On,
+            Some(FaultHold(_)) => Light::Alarm,
+        }
     }
 
     /// Whether nothing is driven, as of the latest tick.
@@ -229,12 +236,4 @@ pub(super) fn replace<T>(slot: &Slot<T>, value: T) {
     slot.clear();
     // With one writer there is room.
     let _ = slot.try_send(value);
-}
-
-const fn light_of(mode: Mode) -> Light {
-    match mode {
-        Mode::Boot | Mode::SelfTest | Mode::Zero | Mode::Idle | Mode::Complete(_) => Light::Off,
-        Mode::Preload(_) | Mode::Run(..) | Mode::Stopping(_) | Mode::Service => Light::On,
-        Mode::FaultHold(_) => Light::Alarm,
-    }
 }

@@ -52,12 +52,8 @@ pub async fn motors(
         }
         exchange.publish(output);
         let missed = exchange.liveness.missed(now);
-        watchdog.keep(&recorder.snapshot(
-            &output.telemetry,
-            state.confidence(),
-            missed,
-            state.zeros(),
-        ));
+        let (confidence, zeros) = (state.confidence(), state.zeros());
+        watchdog.keep(&recorder.snapshot(&output.telemetry, confidence, missed, zeros));
         if missed.is_nobody() {
             watchdog.feed();
         }
