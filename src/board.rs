@@ -15,7 +15,7 @@ mod line;
 mod pins;
 #[cfg_attr(
     feature = "hil",
-    expect(unused_imports, dead_code, reason = "the loop's image has no drivers of sensors")
+    expect(unused_imports, reason = "the loop's image has no drivers of sensors")
 )]
 pub(crate) mod registers;
 mod retained;

@@ -8,12 +8,12 @@ use interstage::log::{Identity, identity};
 use interstage::model::Planner;
 use interstage::params::service::{Service, in_force};
 use interstage::params::slots::mend;
-use interstage::params::{Header, ParameterSet, SetError};
+use interstage::params::{ParameterSet, SetError};
 use interstage::tick::Controller;
 use interstage::units::MotorCommand;
 use static_cell::StaticCell;
 
-use super::{Bridges, Lamp, ParameterFlash, Parts, image};
+use super::{ParameterFlash, Parts, image};
 
 /// Parameter set in the image: the prototype, written by `rig-study constants`.
 static PROTOTYPE: &[u8] = include_bytes!("../params/prototype.set");
@@ -49,23 +49,7 @@ fn constants(set: &[u8]) -> Result<Constants, SetError> {
     let rest = set.read_controller(controller)?;
     let planner = PLANNER.init_with(Planner::default);
     rest.read_planner(planner)?;
-    log_header(set.header());
-    Ok((controller, planner, identity(set.header(), controller)))
-}
-
-fn identity(header: &Header, controller: &Controller) -> Identity {
-    Identity {
-        schema: identity::SCHEMA,
-        version: identity::text(env!("CARGO_PKG_VERSION")),
-        build: image::id(),
-        rig: header.name.clone(),
-        parameters: header.parameters,
-        calibration: header.calibration,
-        corner: controller.corner_reach(),
-    }
-}
-
-fn log_header(header: &Header) {
+    let header = set.header();
     defmt::info!(
         "rig {=str}, schema {=u16}, parameters {=u32:08x}, calibration {=u32:08x}",
         header.name.as_str(),
@@ -73,6 +57,16 @@ fn log_header(header: &Header) {
         header.parameters,
         header.calibration
     );
+    let identity = Identity {
+        schema: identity::SCHEMA,
+        version: identity::text(env!("CARGO_PKG_VERSION")),
+        build: image::id(),
+        rig: header.name.clone(),
+        parameters: header.parameters,
+        calibration: header.calibration,
+        corner: controller.corner_reach(),
+    };
+    Ok((controller, planner, identity))
 }
 
 /// Why the drive stays off.
@@ -87,18 +81,14 @@ pub(crate) enum HoldReason {
 }
 
 pub(crate) fn hold(threads: Spawner, parts: Parts, why: HoldReason) {
-    let Parts { motors, light, .. } = parts;
-    // Left as they are until the next start: dropping them would only add code.
-    let sensors =
-        (parts.wheel_encoder, parts.preload_sensor, parts.compression_sensor, parts.arm_angle);
-    core::mem::forget((sensors, parts.watchdog, parts.button, parts.console, parts.journal));
-    threads.spawn(stay_off(motors, light, why).unwrap());
+    threads.spawn(stay_off(parts, why).unwrap());
 }
 
+/// The other parts are left as they are until the next start.
 #[embassy_executor::task]
-async fn stay_off(mut motors: Bridges, mut light: Lamp, why: HoldReason) -> ! {
-    motors.apply(MotorCommand::OFF, MotorCommand::OFF);
-    light.show(Light::Alarm);
+async fn stay_off(mut parts: Parts, why: HoldReason) -> ! {
+    parts.motors.apply(MotorCommand::OFF, MotorCommand::OFF);
+    parts.light.show(Light::Alarm);
     loop {
         match why {
             HoldReason::Image => image::log_damaged(),

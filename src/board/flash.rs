@@ -26,10 +26,7 @@ impl ParameterFlash {
 
 /// Offset of a slot from the begin of flash, bytes.
 const fn offset_of(slot: Slot) -> usize {
-    match slot {
-        Slot::A => SLOTS,
-        Slot::B => SLOTS + SLOT_BYTES,
-    }
+    SLOTS + slot as usize * SLOT_BYTES
 }
 
 impl SetMemory for ParameterFlash {

@@ -12,10 +12,10 @@ pub(crate) use parts::{Angle, Bridges, Button, CompressionSensor, PreloadSensor,
 
 use embassy_executor::{InterruptExecutor, Spawner};
 use embassy_stm32::interrupt::{self, InterruptExt, Priority};
-use rtt_target::{DownChannel, UpChannel};
+use rtt_target::DownChannel;
 
 use super::registers::{IWDG, IwdgKey};
-use super::rtt::Channels;
+use super::rtt::{Channels, Frames};
 use super::safety;
 
 /// Replaces the thread executor.
@@ -37,7 +37,7 @@ type Begin = fn(Spawner, Channels);
 
 /// Runs the host's line in thread mode, where it advances time when every task waits; the tasks
 /// that otherwise run there have an executor of their own.
-pub(crate) fn run((channels, host): (Channels, (UpChannel, DownChannel)), begin: Begin) -> ! {
+pub(crate) fn run((channels, host): (Channels, (Frames, DownChannel)), begin: Begin) -> ! {
     defmt::warn!(
         "image for the loop with a host: it moves no motor; `cargo rig flash` puts the other back"
     );

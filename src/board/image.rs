@@ -11,7 +11,7 @@ use super::light;
 unsafe extern "C" {
     /// The note that the linker writes, see `memory.x`: three words of head, the name
     /// `GNU` with its zero, then the hash of the image.
-    static __build_id: [u8; 24];
+    static __build_id: [[u8; 8]; 3];
     static __vector_table: u32;
     /// Initial values of the statics, with which the image ends.
     static __sidata: u8;
@@ -21,12 +21,9 @@ unsafe extern "C" {
 
 /// First eight bytes of the image's hash; `readelf -n` shows all of it.
 pub(super) fn id() -> [u8; 8] {
-    let mut id = [0; 8];
     // SAFETY: the linker script keeps the note in flash, where nothing changes it; it is longer
     // than what is read.
-    let note = unsafe { &__build_id };
-    id.copy_from_slice(&note[16..]);
-    id
+    unsafe { __build_id[2] }
 }
 
 /// Its words in flash; the rest of an incomplete last word belongs to no image.

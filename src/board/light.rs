@@ -1,11 +1,10 @@
 //! LD2. A task drives the pin, because blinking takes time; the indicator only signals it.
 
-use embassy_futures::select::{Either, select};
 use embassy_stm32::Peri;
 use embassy_stm32::gpio::{AnyPin, Level, Output, Speed};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
-use embassy_time::{Duration, Timer};
+use embassy_time::{Duration, with_timeout};
 use interstage::hal::{Indicator, Light};
 
 use super::registers::{GPIOA, GPIOC, Moder, RCC};
@@ -50,20 +49,13 @@ pub(crate) async fn show(pin: Peri<'static, AnyPin>) -> ! {
     let mut light = Light::Off;
     loop {
         light = match light {
-            Light::Off => {
-                pin.set_low();
-                WANTED.wait().await
-            }
-            Light::On => {
-                pin.set_high();
+            Light::Off | Light::On => {
+                pin.set_level((light == Light::On).into());
                 WANTED.wait().await
             }
             Light::Alarm => {
                 pin.toggle();
-                match select(WANTED.wait(), Timer::after(HALF_PERIOD)).await {
-                    Either::First(wanted) => wanted,
-                    Either::Second(()) => Light::Alarm,
-                }
+                with_timeout(HALF_PERIOD, WANTED.wait()).await.unwrap_or(light)
             }
         };
     }

@@ -1,16 +1,18 @@
 //! The binary line to the host over real-time transfer.
 
 use interstage::hal::Line;
-use rtt_target::{ChannelMode, DownChannel, UpChannel};
+use rtt_target::DownChannel;
+
+use super::rtt::Frames;
 
 /// RTT up channel 2 and down channel 1.
 pub(crate) struct HostLine {
-    up: UpChannel,
+    up: Frames,
     down: DownChannel,
 }
 
 impl HostLine {
-    pub(crate) fn new((up, down): (UpChannel, DownChannel)) -> Self {
+    pub(crate) fn new((up, down): (Frames, DownChannel)) -> Self {
         Self { up, down }
     }
 }
@@ -21,9 +23,7 @@ impl Line for HostLine {
     }
 
     fn write(&mut self, bytes: &[u8]) -> bool {
-        // A probe may have switched it to blocking.
-        self.up.set_mode(ChannelMode::NoBlockSkip);
-        self.up.write(bytes) == bytes.len()
+        self.up.send(bytes)
     }
 
     fn restart(&mut self) {

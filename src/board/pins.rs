@@ -8,10 +8,10 @@ mod readback;
 mod wheel;
 
 use embassy_stm32::gpio::AnyPin;
-use embassy_stm32::peripherals::{ADC1, ADC2};
 use embassy_stm32::{Peri, Peripherals};
 use rtt_target::DownChannel;
 
+use super::registers::{ADC1, ADC2, ADC3, DMA1, TIM1, TIM8};
 use super::rtt::Frames;
 use super::{Console, Guard, Lamp, ParameterFlash, Parts, TextLog};
 use analog::{Analog, Ring};
@@ -23,10 +23,10 @@ use readback::Readback;
 pub(crate) use wheel::Wheel;
 
 /// The preload sensor's converter.
-pub(crate) type PreloadSensor = Analog<ADC1>;
+pub(crate) type PreloadSensor = Analog;
 
 /// The compression sensor's converter.
-pub(crate) type CompressionSensor = Analog<ADC2>;
+pub(crate) type CompressionSensor = Analog;
 
 static PRELOAD_SENSOR: Ring = Ring::new();
 static COMPRESSION_SENSOR: Ring = Ring::new();
@@ -42,13 +42,23 @@ pub(crate) fn split(
 ) -> (Parts, Peri<'static, AnyPin>, ParameterFlash) {
     let parts = Parts {
         wheel_encoder: Wheel::new(p.TIM5, p.PA0, p.PA1),
-        preload_sensor: Analog::new(p.ADC1, p.PC2, p.DMA1_CH1, &PRELOAD_SENSOR),
-        compression_sensor: Analog::new(p.ADC2, p.PC3, p.DMA1_CH2, &COMPRESSION_SENSOR),
+        preload_sensor: Analog::new(
+            (p.ADC1, ADC1),
+            p.PC2,
+            (p.DMA1_CH1, DMA1.ch(0)),
+            &PRELOAD_SENSOR,
+        ),
+        compression_sensor: Analog::new(
+            (p.ADC2, ADC2),
+            p.PC3,
+            (p.DMA1_CH2, DMA1.ch(1)),
+            &COMPRESSION_SENSOR,
+        ),
         arm_angle: Angle::new(p.SPI1, (p.PB3, p.PA7, p.PA6), p.PB10),
         motors: Bridges {
-            drive: Bridge::new(p.TIM1, p.PA8, p.PA9.into(), p.PA10.into(), p.PB12),
-            preload: Bridge::new(p.TIM8, p.PC6, p.PC8.into(), p.PC9.into(), p.PB7),
-            readback: Readback::new(p.ADC3, p.PB0, p.PB1),
+            drive: Bridge::new((p.TIM1, TIM1), p.PA8, p.PA9.into(), p.PA10.into(), p.PB12),
+            preload: Bridge::new((p.TIM8, TIM8), p.PC6, p.PC8.into(), p.PC9.into(), p.PB7),
+            readback: Readback::new((p.ADC3, ADC3), p.PB0, p.PB1),
         },
         watchdog: Guard::new(p.IWDG, p.TIM7),
         button: Button::new(p.PC13, p.EXTI13),

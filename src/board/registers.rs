@@ -14,7 +14,6 @@
 //! | RCC, GPIOA, GPIOC | causes of a reset; the light and the bridges' lines before anything runs |
 
 use embassy_stm32::pac;
-use embassy_stm32::peripherals;
 
 pub(crate) use pac::adc::Adc;
 pub(crate) use pac::adc::vals::Exten;
@@ -26,35 +25,6 @@ pub(crate) use pac::pwr::regs::Cr5;
 pub(crate) use pac::timer::TimAdv;
 pub(crate) use pac::timer::vals::{FilterValue, Ocm};
 pub(crate) use pac::{
-    DBGMCU, EXTI, FLASH, GPIOA, GPIOC, IWDG, PWR, RCC, SPI1, SYSCFG, TIM1, TIM5, TIM8,
+    ADC1, ADC2, ADC3, DBGMCU, DMA1, EXTI, FLASH, GPIOA, GPIOC, IWDG, PWR, RCC, SPI1, SYSCFG, TIM1,
+    TIM5, TIM8,
 };
-
-/// A peripheral that the library hands out once, and its registers.
-pub(crate) trait Peripheral {
-    /// Kind of its registers.
-    type Registers;
-    /// They themselves.
-    fn registers() -> Self::Registers;
-}
-
-macro_rules! peripherals {
-    ($($name:ident: $kind:ty = $registers:expr;)*) => {$(
-        impl Peripheral for peripherals::$name {
-            type Registers = $kind;
-
-            fn registers() -> $kind {
-                $registers
-            }
-        }
-    )*};
-}
-
-peripherals! {
-    ADC1: Adc = pac::ADC1;
-    ADC2: Adc = pac::ADC2;
-    ADC3: Adc = pac::ADC3;
-    DMA1_CH1: DmaChannel = pac::DMA1.ch(0);
-    DMA1_CH2: DmaChannel = pac::DMA1.ch(1);
-    TIM1: TimAdv = TIM1;
-    TIM8: TimAdv = TIM8;
-}

@@ -28,7 +28,7 @@ pub(crate) struct Channels {
     /// Down 0: operator's letters.
     pub(crate) console: DownChannel,
     /// Up 2 and down 1: the binary line.
-    pub(crate) line: (UpChannel, DownChannel),
+    pub(crate) line: (Frames, DownChannel),
 }
 
 /// Sets up the channels and the log, with these more channels, which are given back as well.
@@ -50,8 +50,8 @@ macro_rules! init {
                 $($down)*
             }
         };
-        log_to($all.up.0);
-        let (telemetry, line) = (Frames($all.up.1), ($all.up.2, $all.down.1));
+        log_to(Frames($all.up.0));
+        let (telemetry, line) = (Frames($all.up.1), (Frames($all.up.2), $all.down.1));
         (Channels { telemetry, console: $all.down.0, line }, $more)
     }};
 }
@@ -64,20 +64,20 @@ pub(crate) fn init() -> Channels {
 
 /// The same with up 3 and down 2 for the closed loop with the host.
 #[cfg(feature = "hil")]
-pub(crate) fn init() -> (Channels, (UpChannel, DownChannel)) {
+pub(crate) fn init() -> (Channels, (Frames, DownChannel)) {
     init!(
         [3: { size: 64, mode: ChannelMode::NoBlockSkip, name: "hil" }],
         [2: { size: 64, name: "hil" }],
-        all => (all.up.3, all.down.2)
+        all => (Frames(all.up.3), all.down.2)
     )
 }
 
-fn log_to(channel: UpChannel) {
+fn log_to(channel: Frames) {
     // SAFETY: nothing has been logged yet, so nobody else holds the state.
     unsafe { (*STATE.0.get()).channel = Some(channel) };
 }
 
-/// The binary log's channel.
+/// A channel to the host.
 pub(crate) struct Frames(UpChannel);
 
 impl Frames {
@@ -95,7 +95,7 @@ pub(crate) fn lost() -> u32 {
 }
 
 struct State {
-    channel: Option<UpChannel>,
+    channel: Option<Frames>,
     encoder: Encoder,
     bytes: [u8; FRAME],
     length: usize,
@@ -117,9 +117,8 @@ impl State {
 
     fn send(&mut self) {
         let Some(channel) = &mut self.channel else { return };
-        channel.set_mode(ChannelMode::NoBlockSkip);
         let frame = self.bytes.get(..self.length).unwrap_or_default();
-        if self.cut || channel.write(frame) < self.length {
+        if self.cut || !channel.send(frame) {
             LOST.fetch_add(1, Ordering::Relaxed);
         }
     }

@@ -60,6 +60,17 @@ pub struct Given {
 }
 
 impl Given {
+    /// No sensor answers, and nothing happens.
+    pub const NOTHING: Self = Self {
+        wheel_encoder: 0,
+        preload_sensor: None,
+        compression_sensor: None,
+        arm_angle: None,
+        bridges: None,
+        stop: false,
+        command: 0,
+    };
+
     /// Every sensor answers with these codes; nothing else happens.
     pub const fn codes(
         wheel_encoder: EncoderCount,
@@ -74,8 +85,7 @@ impl Given {
             compression_sensor: Some(compression_sensor.get()),
             arm_angle: Some(arm_angle.get()),
             bridges: Some([bridges.drive.get(), bridges.pretightener.get()]),
-            stop: false,
-            command: 0,
+            ..Self::NOTHING
         }
     }
 
@@ -86,22 +96,13 @@ impl Given {
 
     /// The same with no sensor answering but the wheel's counter, which cannot fail.
     pub const fn silent(self) -> Self {
-        Self {
-            preload_sensor: None,
-            compression_sensor: None,
-            arm_angle: None,
-            bridges: None,
-            command: 0,
-            ..self
-        }
+        Self { wheel_encoder: self.wheel_encoder, stop: self.stop, ..Self::NOTHING }
     }
 
     /// Output of the bridges, if it was converted.
     pub fn readback(&self) -> Option<BridgeCodes> {
-        self.bridges.map(|codes| BridgeCodes {
-            drive: BridgeCode::new(codes[0]),
-            pretightener: BridgeCode::new(codes[1]),
-        })
+        let [drive, pretightener] = self.bridges?.map(BridgeCode::new);
+        Some(BridgeCodes { drive, pretightener })
     }
 }
 
@@ -142,10 +143,7 @@ impl Taken {
     /// Commands of drive and pre-tightener.
     pub fn commands(&self) -> (MotorCommand, MotorCommand) {
         let command = |duty: Option<i16>| {
-            duty.map_or(MotorCommand::OFF, |bits| MotorCommand {
-                duty: Duty::from_bits(bits),
-                enable: true,
-            })
+            duty.map_or(MotorCommand::OFF, |bits| MotorCommand::on(Duty::from_bits(bits)))
         };
         (command(self.drive), command(self.preload))
     }

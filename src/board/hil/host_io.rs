@@ -10,58 +10,32 @@ use interstage::supervise::Command;
 use interstage::units::MotorCommand;
 
 /// What the host's line exchanges with the parts of the board that it replaces.
+#[derive(Clone, Copy)]
 pub(super) struct HostIo {
-    given: Mutex<Raw, Cell<Given>>,
-    commands: Mutex<Raw, Cell<(MotorCommand, MotorCommand)>>,
+    pub(super) given: Given,
+    /// Of drive and pre-tightener.
+    pub(super) commands: (MotorCommand, MotorCommand),
     /// The emergency stop has cut the bridges, and no reset has re-enabled them.
-    cut: Mutex<Raw, Cell<bool>>,
-    /// The operator's command.
-    pub(super) pressed: Signal<Raw, Command>,
+    pub(super) cut: bool,
 }
 
-pub(super) static HOST_IO: HostIo = HostIo {
-    given: Mutex::new(Cell::new(Given {
-        wheel_encoder: 0,
-        preload_sensor: None,
-        compression_sensor: None,
-        arm_angle: None,
-        bridges: None,
-        stop: false,
-        command: 0,
-    })),
-    commands: Mutex::new(Cell::new((MotorCommand::OFF, MotorCommand::OFF))),
-    cut: Mutex::new(Cell::new(false)),
-    pressed: Signal::new(),
-};
+static HOST_IO: Mutex<Raw, Cell<HostIo>> = Mutex::new(Cell::new(HostIo {
+    given: Given::NOTHING,
+    commands: (MotorCommand::OFF, MotorCommand::OFF),
+    cut: false,
+}));
 
-impl HostIo {
-    pub(super) fn given(&self) -> Given {
-        self.given.lock(Cell::get)
-    }
+/// The operator's command.
+pub(super) static PRESSED: Signal<Raw, Command> = Signal::new();
 
-    pub(super) fn give(&self, given: Given) {
-        self.given.lock(|place| place.set(given));
-        if given.stop {
-            self.cut.lock(|cut| cut.set(true));
-        }
-    }
+pub(super) fn get() -> HostIo {
+    HOST_IO.lock(Cell::get)
+}
 
-    pub(super) fn commands(&self) -> (MotorCommand, MotorCommand) {
-        self.commands.lock(Cell::get)
-    }
-
-    pub(super) fn apply(&self, drive: MotorCommand, preload: MotorCommand) {
-        self.commands.lock(|place| place.set((drive, preload)));
-    }
-
-    pub(super) fn is_cut(&self) -> bool {
-        self.cut.lock(Cell::get)
-    }
-
-    /// Re-enables the bridges, if the stop's contact is closed again.
-    pub(super) fn rearm(&self) {
-        if !self.given().stop {
-            self.cut.lock(|cut| cut.set(false));
-        }
-    }
+pub(super) fn change(make: impl FnOnce(&mut HostIo)) {
+    HOST_IO.lock(|place| {
+        let mut io = place.get();
+        make(&mut io);
+        place.set(io);
+    });
 }

@@ -9,7 +9,7 @@ use interstage::supervise::Command;
 use interstage::units::MotorCommand;
 use rtt_target::DownChannel;
 
-use super::host_io::HOST_IO;
+use super::host_io::{self, PRESSED};
 use crate::board::rtt::Frames;
 use crate::board::{Console, Guard, Lamp, ParameterFlash, Parts, TextLog};
 
@@ -18,7 +18,7 @@ pub(crate) struct Wheel;
 
 impl WheelEncoder for Wheel {
     fn count(&mut self) -> EncoderCount {
-        EncoderCount::new(HOST_IO.given().wheel_encoder)
+        EncoderCount::new(host_io::get().given.wheel_encoder)
     }
 }
 
@@ -31,7 +31,7 @@ pub(crate) struct Analog(fn(&Given) -> Option<u16>);
 
 impl AnalogInput for Analog {
     async fn sample(&mut self) -> Result<AdcCode, BusFault> {
-        (self.0)(&HOST_IO.given()).map(AdcCode::new).ok_or(BusFault::Timeout)
+        (self.0)(&host_io::get().given).map(AdcCode::new).ok_or(BusFault::Timeout)
     }
 }
 
@@ -40,7 +40,7 @@ pub(crate) struct Angle;
 
 impl AngleBus for Angle {
     async fn frame(&mut self) -> Result<AngleFrame, BusFault> {
-        HOST_IO.given().arm_angle.map(AngleFrame::new).ok_or(BusFault::Timeout)
+        host_io::get().given.arm_angle.map(AngleFrame::new).ok_or(BusFault::Timeout)
     }
 }
 
@@ -51,19 +51,19 @@ pub(crate) struct Bridges {
 
 impl Motors for Bridges {
     fn apply(&mut self, drive: MotorCommand, preload: MotorCommand) {
-        HOST_IO.apply(drive, preload);
+        host_io::change(|io| io.commands = (drive, preload));
     }
 
     fn readback(&mut self) -> Option<BridgeCodes> {
-        HOST_IO.given().readback()
+        host_io::get().given.readback()
     }
 
     fn stopped(&mut self) -> bool {
-        HOST_IO.is_cut()
+        host_io::get().cut
     }
 
     fn rearm(&mut self) {
-        HOST_IO.rearm();
+        host_io::change(|io| io.cut &= io.given.stop);
     }
 }
 
@@ -72,7 +72,7 @@ pub(crate) struct Button;
 
 impl CommandSource for Button {
     async fn next(&mut self) -> Command {
-        HOST_IO.pressed.wait().await
+        PRESSED.wait().await
     }
 }
 

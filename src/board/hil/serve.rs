@@ -9,10 +9,11 @@ use interstage::hal::hil::{FIRST, Given, PROTOCOL, Taken, ToBoard, ToHost};
 use interstage::log::codes;
 use interstage::params::link::{FrameReader, frame};
 use interstage::units::Tick;
-use rtt_target::{ChannelMode, DownChannel, UpChannel};
+use rtt_target::DownChannel;
 
 use super::clock;
-use super::host_io::HOST_IO;
+use super::host_io::{self, PRESSED};
+use crate::board::rtt::Frames;
 use crate::board::safety::UNFED;
 use crate::board::{EXCHANGE, guard};
 
@@ -23,8 +24,6 @@ const MILLISECOND: u32 = 170_000;
 /// busy with something else.
 const SILENCE: u32 = 200 * MILLISECOND;
 
-type Channels = (UpChannel, DownChannel);
-
 /// Waits for a host, calls `begin`, which starts the tasks, and serves the host's ticks. Before
 /// a host has come nothing runs but the watchdog, which this feeds: it runs only while every task
 /// waits.
@@ -32,12 +31,12 @@ type Channels = (UpChannel, DownChannel);
 /// When the host falls silent, the sensors do. The board continues alone, a tick a millisecond,
 /// so that the controller finds the fault, switches the bridges off and holds, and the ticks
 /// feed the watchdog. Only a restart ends that.
-pub(super) fn serve(channels: Channels, begin: impl FnOnce()) -> ! {
+pub(super) fn serve((up, down): (Frames, DownChannel), begin: impl FnOnce()) -> ! {
     guard::count_cycles();
     // SAFETY: what the tasks get at `begin` is set up once more, to the same.
     let mut dog = IndependentWatchdog::new(unsafe { IWDG::steal() }, guard::TIMEOUT_US);
     dog.unleash();
-    let mut line = HostConnection { channels, reader: FrameReader::new() };
+    let mut line = HostConnection { up, down, reader: FrameReader::new() };
     while line.take() != Some(ToBoard::Hello { protocol: PROTOCOL }) {
         dog.pet();
     }
@@ -57,7 +56,7 @@ pub(super) fn serve(channels: Channels, begin: impl FnOnce()) -> ! {
             }
         } else if run.alone && DWT::cycle_count().wrapping_sub(heard) >= MILLISECOND {
             heard = heard.wrapping_add(MILLISECOND);
-            run.tick(HOST_IO.given().silent());
+            run.tick(host_io::get().given.silent());
         } else if DWT::cycle_count().wrapping_sub(heard) >= SILENCE {
             heard = DWT::cycle_count();
             run.alone = true;
@@ -85,7 +84,7 @@ impl Run {
             ToBoard::Hello { protocol } => (protocol == PROTOCOL).then(|| self.next_tick()),
             ToBoard::Tick(tick, given) if tick == self.next && !self.alone => {
                 self.tick(given);
-                let (drive, preload) = HOST_IO.commands();
+                let (drive, preload) = host_io::get().commands;
                 let mode = EXCHANGE.telemetry().map_or(0, |seen| codes::of_mode(seen.mode));
                 let taken = Taken::new(drive, preload, mode);
                 self.last = Some((tick, taken));
@@ -101,9 +100,12 @@ impl Run {
 
     /// A tick; the command first, because its task has to pass it on.
     fn tick(&mut self, given: Given) {
-        HOST_IO.give(given);
+        host_io::change(|io| {
+            io.given = given;
+            io.cut |= given.stop;
+        });
         if let Some(command) = codes::command(given.command) {
-            HOST_IO.pressed.signal(command);
+            PRESSED.signal(command);
             clock::settle();
         }
         clock::advance(self.next);
@@ -113,7 +115,8 @@ impl Run {
 }
 
 struct HostConnection {
-    channels: Channels,
+    up: Frames,
+    down: DownChannel,
     reader: FrameReader,
 }
 
@@ -121,7 +124,7 @@ impl HostConnection {
     /// The next complete message that has arrived.
     fn take(&mut self) -> Option<ToBoard> {
         let mut byte = [0];
-        while self.channels.1.read(&mut byte) > 0 {
+        while self.down.read(&mut byte) > 0 {
             if let Some(message) = self.reader.take(byte[0]) {
                 return Some(message);
             }
@@ -131,11 +134,8 @@ impl HostConnection {
 
     /// A host that does not read asks again.
     fn send(&mut self, message: &ToHost) {
-        let up = &mut self.channels.0;
-        // A probe may have switched it to blocking.
-        up.set_mode(ChannelMode::NoBlockSkip);
         if let Some(frame) = frame(message) {
-            let _ = up.write(&frame);
+            let _ = self.up.send(&frame);
         }
     }
 }

@@ -7,8 +7,8 @@
 //! in an interrupt.
 
 use embassy_stm32::adc::{
-    Adc, AdcChannel, AdcConfig, CONTINUOUS, DefaultInstance, Resolution, RingBufferedAdc, Rovsm,
-    RxDma, SampleTime, Trovs,
+    Adc, AdcChannel, AdcConfig, CONTINUOUS, DefaultInstance, Resolution, Rovsm, RxDma, SampleTime,
+    Trovs,
 };
 use embassy_stm32::interrupt::typelevel::{Binding, Interrupt};
 use embassy_stm32::{Peri, dma};
@@ -18,7 +18,7 @@ use interstage::sense::raw::{AdcCode, BusFault};
 use static_cell::StaticCell;
 
 use crate::board::Irqs;
-use crate::board::registers::{Adc as Registers, DmaChannel as Channel, Exten, Peripheral};
+use crate::board::registers::{Adc as Registers, DmaChannel as Channel, Exten};
 
 /// `OVSR` for 256 conversions a code.
 const RATIO_256: u8 = 7;
@@ -34,13 +34,7 @@ const LIMIT: Duration = Duration::from_micros(500);
 const RING: usize = 64;
 
 /// Ring for the codes of a sensor.
-pub(crate) struct Ring(StaticCell<[u16; RING]>);
-
-impl Ring {
-    pub(crate) const fn new() -> Self {
-        Self(StaticCell::new())
-    }
-}
+pub(crate) type Ring = StaticCell<[u16; RING]>;
 
 /// The ring, as one task reads it.
 struct Written(*const u16);
@@ -48,23 +42,21 @@ struct Written(*const u16);
 // SAFETY: it points to a static that only DMA writes, and is only read.
 unsafe impl Send for Written {}
 
-pub(crate) struct Analog<T: DefaultInstance> {
+pub(crate) struct Analog {
     registers: Registers,
     channel: Channel,
     written: Written,
     /// The channel's count when the latest code was taken.
     left: u16,
-    /// Dropping it would stop the conversions.
-    _converter: RingBufferedAdc<'static, T>,
 }
 
-impl<T: DefaultInstance + Peripheral<Registers = Registers>> Analog<T> {
-    /// Calibrates the converter and starts converting `pin` through this DMA channel. Each ring
-    /// serves once.
-    pub(crate) fn new<D: RxDma<T> + Peripheral<Registers = Channel>>(
-        adc: Peri<'static, T>,
+impl Analog {
+    /// Calibrates the converter and starts converting `pin` through this DMA channel, both with
+    /// their registers. Each ring serves once.
+    pub(crate) fn new<T: DefaultInstance, D: RxDma<T>>(
+        (adc, registers): (Peri<'static, T>, Registers),
         pin: impl AdcChannel<T> + 'static,
-        dma: Peri<'static, D>,
+        (dma, channel): (Peri<'static, D>, Channel),
         ring: &'static Ring,
     ) -> Self
     where
@@ -79,7 +71,7 @@ impl<T: DefaultInstance + Peripheral<Registers = Registers>> Analog<T> {
         };
         // The amplifiers are buffered: the shortest sampling time of the slow channels suffices.
         let sequence = [(pin.degrade_adc(), SampleTime::CYCLES12_5)];
-        let ring: *mut [u16; RING] = ring.0.init([0; RING]);
+        let ring: *mut [u16; RING] = ring.init([0; RING]);
         let written = Written(ring.cast());
         // SAFETY: the only reference to it. The driver lends its memory to DMA and looks at none of
         // it, so that it is read through `written` alone.
@@ -93,16 +85,14 @@ impl<T: DefaultInstance + Peripheral<Registers = Registers>> Analog<T> {
             Exten::DISABLED,
         );
         converter.start();
+        // Dropping it would stop the conversions.
+        core::mem::forget(converter);
         // No interrupt at the ring's half or end. The channel's own switches must not be written
         // while it is enabled, which it is since before the driver gave it back.
         D::Interrupt::disable();
-        let channel = D::registers();
-        let registers = T::registers();
-        Self { registers, channel, written, left: RING as u16, _converter: converter }
+        Self { registers, channel, written, left: RING as u16 }
     }
-}
 
-impl<T: DefaultInstance> Analog<T> {
     /// The latest code, if one has arrived since the last call.
     fn latest(&mut self) -> Option<AdcCode> {
         let left = self.channel.ndtr().read().ndt();
@@ -118,7 +108,7 @@ impl<T: DefaultInstance> Analog<T> {
     }
 }
 
-impl<T: DefaultInstance> AnalogInput for Analog<T> {
+impl AnalogInput for Analog {
     async fn sample(&mut self) -> Result<AdcCode, BusFault> {
         if let Some(code) = self.latest() {
             return Ok(code);

@@ -9,9 +9,7 @@
 
 use embassy_stm32::Peri;
 use embassy_stm32::gpio::{Level, Output, Pull, Speed};
-use embassy_stm32::mode::Blocking;
 use embassy_stm32::peripherals::{PA6, PA7, PB3, PB10, SPI1};
-use embassy_stm32::spi::mode::Master;
 use embassy_stm32::spi::{Config, MODE_1, Spi};
 use embassy_stm32::time::Hertz;
 use interstage::hal::AngleBus;
@@ -37,7 +35,6 @@ const SELECT_ROUNDS: u32 = SYSCLK_HZ / 1_000_000 * 525 / 1000 / 3 + 1;
 const FRAME_ROUNDS: u32 = 500;
 
 pub(crate) struct Angle {
-    _bus: Spi<'static, Blocking, Master>,
     select: Output<'static>,
     /// The next answer is that of the diagnostics.
     diagnosed: bool,
@@ -64,7 +61,9 @@ impl Angle {
         // With nothing selected, sets the bus to frames of 16 bits once: the driver would do it
         // for each frame, which takes half as long as the frame.
         let _ = bus.blocking_transfer_in_place(&mut [READ_ANGLE]);
-        let mut angle = Self { _bus: bus, select, diagnosed: false, field: true };
+        // Dropping it would stop the bus.
+        core::mem::forget(bus);
+        let mut angle = Self { select, diagnosed: false, field: true };
         // A reset in the middle of a frame is an error.
         let _ = angle.exchange(READ_ERRORS);
         angle

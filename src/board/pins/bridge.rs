@@ -1,7 +1,7 @@
 //! The two motor bridges, each driven by PWM, direction and enable, and the
 //! emergency stop on the timers' break inputs.
 
-use core::mem::ManuallyDrop;
+use core::mem::{self, ManuallyDrop};
 
 use embassy_stm32::Peri;
 use embassy_stm32::gpio::{AfType, AnyPin, Flex, Level, Output, OutputType, Pull, Speed};
@@ -20,7 +20,7 @@ use interstage::sense::raw::BridgeCodes;
 use interstage::units::MotorCommand;
 
 use super::readback::Readback;
-use crate::board::registers::{Ocm, Peripheral, TimAdv};
+use crate::board::registers::{Ocm, TimAdv};
 
 /// Periods of the PWM, 50 us each, that a tick gives: 2.5 ms.
 const DEAD_MAN: u16 = 50;
@@ -40,16 +40,15 @@ pub(crate) struct Bridge<T: AdvancedInstance4Channel> {
     period: u32,
     forward: ManuallyDrop<Output<'static>>,
     enable: ManuallyDrop<Output<'static>>,
-    _stop: ManuallyDrop<Flex<'static>>,
 }
 
-impl<T: AdvancedInstance4Channel + Peripheral<Registers = TimAdv>> Bridge<T> {
-    /// A bridge that is off.
+impl<T: AdvancedInstance4Channel> Bridge<T> {
+    /// A bridge that is off, with a timer and its registers.
     ///
     /// `stop` is the emergency stop: a contact to ground that opens. High, and so
     /// a broken wire too, takes the PWM away in hardware, whatever the software does.
     pub(crate) fn new<S: BreakInputPin<T, BkIn1>>(
-        timer: Peri<'static, T>,
+        (timer, registers): (Peri<'static, T>, TimAdv),
         pwm: Peri<'static, impl TimerPin<T, Ch1>>,
         forward: Peri<'static, AnyPin>,
         enable: Peri<'static, AnyPin>,
@@ -78,13 +77,13 @@ impl<T: AdvancedInstance4Channel + Peripheral<Registers = TimAdv>> Bridge<T> {
         let alternate = stop.af_num();
         let mut stop = Flex::new(stop);
         stop.set_as_af_unchecked(alternate, AfType::input(Pull::Up));
+        mem::forget(stop);
         pwm.set_break_polarity(BreakInputPolarity::ACTIVE_HIGH);
         pwm.set_break_filter(FilterValue::FDTS_DIV32_N8);
         pwm.set_break_input_pin_enable(true);
         // With the outputs off the timer keeps the PWM line low.
         pwm.set_off_state_selection_idle(Ossi::IDLE_LEVEL);
         pwm.set_repetition_counter(DEAD_MAN - 1);
-        let registers = T::registers();
         registers.cr1().modify(|w| w.set_opm(true));
         let period = pwm.get_max_duty();
         let mut bridge = Self {
@@ -93,7 +92,6 @@ impl<T: AdvancedInstance4Channel + Peripheral<Registers = TimAdv>> Bridge<T> {
             period,
             forward: ManuallyDrop::new(forward),
             enable: ManuallyDrop::new(enable),
-            _stop: ManuallyDrop::new(stop),
         };
         bridge.chop(0);
         // Low at the begin of a period, where a pulse stops, and high behind the compare.

@@ -9,6 +9,7 @@
 
 use embassy_stm32::Peri;
 use embassy_stm32::exti::ExtiInput;
+use embassy_stm32::gpio::Level::{self, High as PRESSED, Low as RELEASED};
 use embassy_stm32::gpio::Pull;
 use embassy_stm32::mode::Async;
 use embassy_stm32::peripherals::{EXTI13, PC13};
@@ -53,24 +54,15 @@ impl Button {
         Self { pin: ExtiInput::new(pin, line, Pull::Down, Irqs), gesture: Gesture::None }
     }
 
-    async fn pressed(&mut self) {
-        self.settled(true).await;
-    }
-
-    async fn released(&mut self) {
-        self.settled(false).await;
-    }
-
-    /// Waits until the pin has a level and keeps it over the bounce.
-    async fn settled(&mut self, high: bool) {
+    /// Waits until the pin has this level and keeps it over the bounce.
+    async fn settled(&mut self, level: Level) {
         loop {
-            if high {
-                self.pin.wait_for_high().await;
-            } else {
-                self.pin.wait_for_low().await;
+            match level {
+                PRESSED => self.pin.wait_for_high().await,
+                RELEASED => self.pin.wait_for_low().await,
             }
             Timer::after(BOUNCE).await;
-            if self.pin.is_high() == high {
+            if self.pin.get_level() == level {
                 return;
             }
         }
@@ -82,15 +74,15 @@ impl CommandSource for Button {
         loop {
             match self.gesture {
                 Gesture::None => {
-                    self.pressed().await;
+                    self.settled(PRESSED).await;
                     let mut tapped = Command::Start;
                     loop {
-                        if with_timeout(STOP, self.released()).await.is_err() {
+                        if with_timeout(STOP, self.settled(RELEASED)).await.is_err() {
                             self.gesture = Gesture::Stopped;
                             return Command::Stop;
                         }
                         if tapped == Command::Retract
-                            || with_timeout(DOUBLE, self.pressed()).await.is_err()
+                            || with_timeout(DOUBLE, self.settled(PRESSED)).await.is_err()
                         {
                             return tapped;
                         }
@@ -98,14 +90,14 @@ impl CommandSource for Button {
                     }
                 }
                 Gesture::Stopped => {
-                    if with_timeout(RESET, self.released()).await.is_err() {
+                    if with_timeout(RESET, self.settled(RELEASED)).await.is_err() {
                         self.gesture = Gesture::Reset;
                         return Command::Reset;
                     }
                     self.gesture = Gesture::None;
                 }
                 Gesture::Reset => {
-                    self.released().await;
+                    self.settled(RELEASED).await;
                     self.gesture = Gesture::None;
                 }
             }

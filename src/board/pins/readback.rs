@@ -6,11 +6,11 @@
 //! of the hardware.
 
 use embassy_stm32::Peri;
-use embassy_stm32::adc::{Adc, AdcChannel, AdcConfig, AnyAdcChannel, SampleTime};
+use embassy_stm32::adc::{Adc, AdcChannel, AdcConfig, SampleTime};
 use embassy_stm32::peripherals::ADC3;
 use interstage::sense::raw::{BridgeCode, BridgeCodes};
 
-use crate::board::registers::{Adc as Registers, Peripheral};
+use crate::board::registers::Adc as Registers;
 
 /// `OVSR` for 256 conversions a code: 151 us, three periods of the bridges' PWM.
 const RATIO_256: u8 = 7;
@@ -20,21 +20,18 @@ const SHIFT: u8 = 8;
 
 pub(crate) struct Readback {
     registers: Registers,
-    _pins: [AnyAdcChannel<'static, ADC3>; 2],
 }
 
 impl Readback {
-    /// Calibrates the converter and starts the first conversions.
+    /// Calibrates the converter, which has these registers, and starts the first conversions.
     pub(crate) fn new(
-        adc: Peri<'static, ADC3>,
+        (adc, registers): (Peri<'static, ADC3>, Registers),
         drive: impl AdcChannel<ADC3> + 'static,
         preload: impl AdcChannel<ADC3> + 'static,
     ) -> Self {
-        let registers = ADC3::registers();
         // Dropping the driver leaves the converter on and calibrated.
         let _ = Adc::new(adc, AdcConfig::default());
-        let pins = [drive.degrade_adc(), preload.degrade_adc()];
-        let channels = [pins[0].get_hw_channel(), pins[1].get_hw_channel()];
+        let channels = [drive.degrade_adc(), preload.degrade_adc()].map(|pin| pin.get_hw_channel());
         registers.cfgr2().modify(|w| {
             w.set_ovsr(RATIO_256);
             w.set_ovss(SHIFT);
@@ -54,7 +51,7 @@ impl Readback {
             w.set_jsq(0, channels[0]);
             w.set_jsq(1, channels[1]);
         });
-        let readback = Self { registers, _pins: pins };
+        let readback = Self { registers };
         readback.start();
         readback
     }
