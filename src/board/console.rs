@@ -10,13 +10,7 @@ use rtt_target::DownChannel;
 const POLL: Duration = Duration::from_millis(20);
 
 /// RTT down channel 0.
-pub(crate) struct Console(DownChannel);
-
-impl Console {
-    pub(crate) fn new(channel: DownChannel) -> Self {
-        Self(channel)
-    }
-}
+pub(crate) struct Console(pub(super) DownChannel);
 
 impl CommandSource for Console {
     async fn next(&mut self) -> Command {
@@ -24,20 +18,15 @@ impl CommandSource for Console {
             let mut letter = [0];
             if self.0.read(&mut letter) == 0 {
                 Timer::at(mid_tick_deadline(POLL)).await;
-            } else if let Some(command) = decode(letter[0]) {
-                return command;
             }
+            return match letter {
+                [b's'] => Command::Start,
+                [b'x'] => Command::Stop,
+                [b'r'] => Command::Retract,
+                [b'0'] => Command::Reset,
+                // Nothing has come, or a line end or another letter.
+                _ => continue,
+            };
         }
-    }
-}
-
-/// The command of a letter; none for line ends and other letters.
-fn decode(letter: u8) -> Option<Command> {
-    match letter {
-        b's' => Some(Command::Start),
-        b'x' => Some(Command::Stop),
-        b'r' => Some(Command::Retract),
-        b'0' => Some(Command::Reset),
-        _ => None,
     }
 }

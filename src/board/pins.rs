@@ -62,7 +62,7 @@ pub(crate) fn split(
         },
         watchdog: Guard::new(p.IWDG, p.TIM7),
         button: Button::new(p.PC13, p.EXTI13),
-        console: Console::new(console),
+        console: Console(console),
         journal: TextLog::new(frames),
         light: Lamp,
     };

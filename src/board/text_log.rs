@@ -130,11 +130,15 @@ impl Journal for TextLog {
 /// The ledger line in physical units.
 fn crossing(at: u32, record: &CrossingRecord) {
     let value = Q16::to_num::<f32>;
+    let direction = match record.direction {
+        Direction::Deploy => "deploying",
+        Direction::Retract => "retracting",
+    };
     info!(
         "[{=u32} ms] step {=u8} {=str}: at {=f32} mm ({=f32} off), {=f32} mm/s, preload {=f32} N (peak {=f32}) {=f32} s ahead, tread {=f32} mm, gap {=f32} mm (predicted {=f32}), slip margin {=f32}, stiffness x{=f32}, limited by {=str}",
         at,
         record.index,
-        of_direction(record.direction),
+        direction,
         value(record.position),
         value(record.residual),
         value(record.speed),
@@ -148,13 +152,6 @@ fn crossing(at: u32, record: &CrossingRecord) {
         value(record.stiffness_scale),
         record.limited_by.map_or("no plan", LimitedBy::words),
     );
-}
-
-fn of_direction(direction: Direction) -> &'static str {
-    match direction {
-        Direction::Deploy => "deploying",
-        Direction::Retract => "retracting",
-    }
 }
 
 fn of_stage(stage: ContactStage) -> &'static str {

@@ -44,10 +44,8 @@ impl AngleBus for Angle {
     }
 }
 
-/// The host's bridges, and the pins of the real ones, which are held low.
-pub(crate) struct Bridges {
-    _low: [Output<'static>; 6],
-}
+/// The host's bridges.
+pub(crate) struct Bridges;
 
 impl Motors for Bridges {
     fn apply(&mut self, drive: MotorCommand, preload: MotorCommand) {
@@ -85,15 +83,17 @@ pub(crate) fn split(
     // PWM, direction and enable of the drive, then of the pre-tightener.
     let pins: [Peri<'static, AnyPin>; 6] =
         [p.PA8.into(), p.PA9.into(), p.PA10.into(), p.PC6.into(), p.PC8.into(), p.PC9.into()];
+    // Held low.
+    core::mem::forget(pins.map(|pin| Output::new(pin, Level::Low, Speed::Low)));
     let parts = Parts {
         wheel_encoder: Wheel,
         preload_sensor: Analog(|given| given.preload_sensor),
         compression_sensor: Analog(|given| given.compression_sensor),
         arm_angle: Angle,
-        motors: Bridges { _low: pins.map(|pin| Output::new(pin, Level::Low, Speed::Low)) },
+        motors: Bridges,
         watchdog: Guard::new(p.IWDG, p.TIM7),
         button: Button,
-        console: Console::new(console),
+        console: Console(console),
         journal: TextLog::new(frames),
         light: Lamp,
     };
