@@ -11,8 +11,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::sense::raw::{AdcCode, AngleFrame, BridgeCode, BridgeCodes, EncoderCount};
-use crate::supervise::codes;
-use crate::supervise::{Command, Mode};
+use crate::supervise::{Command, Mode, codes};
 use crate::units::{Duty, MotorCommand, Tick};
 
 /// RTT channel up.

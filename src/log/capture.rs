@@ -116,18 +116,16 @@ impl Capture {
 
     /// Takes one tick into account; `corner` is the travel of the wheel over a corner, mm.
     pub fn look(&mut self, record: &Record, corner: Millimetres) {
-        let trigger = self.trigger(record, corner);
-        match (self.progress, trigger) {
-            (Progress::Watching, Some(trigger)) => {
-                self.progress = Progress::Filling(trigger, record.at(), AFTER);
+        if let Some(trigger) = self.trigger(record, corner)
+            && match self.progress {
+                Progress::Watching => true,
+                // A fault outweighs what was to be seen before it.
+                Progress::Filling(before, ..) | Progress::Draining(before, ..) => {
+                    trigger == Trigger::Fault && before != Trigger::Fault
+                }
             }
-            // A fault outweighs what was to be seen before it.
-            (
-                Progress::Filling(Trigger::Step | Trigger::Command, ..)
-                | Progress::Draining(Trigger::Step | Trigger::Command, ..),
-                Some(Trigger::Fault),
-            ) => self.progress = Progress::Filling(Trigger::Fault, record.at(), AFTER),
-            _ => {}
+        {
+            self.progress = Progress::Filling(trigger, record.at(), AFTER);
         }
         self.since += 1;
         if self.since < EVERY || matches!(self.progress, Progress::Draining(..)) {

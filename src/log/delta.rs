@@ -55,24 +55,22 @@ impl DeltaRecord {
 
     /// The record as numbers.
     pub(super) fn of(record: &Record) -> Self {
-        let Record { telemetry: t, codes, ages, bridges: [drive, pretightener], flags } = record;
-        let [wheel, preload_sensor, compression_sensor, arm] = codes;
-        let [wheel_age, preload_sensor_age, compression_sensor_age, arm_age] = *ages;
+        let Record { telemetry: t, codes, ages: code_ages, bridges, flags } = record;
+        let [wheel, preload_sensor, compression_sensor, arm] = *codes;
         let mut numbers = [0; NUMBERS];
         let [at, ages, quantities @ ..] = &mut numbers;
         *at = t.at;
         // The arm's age lowest: it changes in every tick, as the arm is read every second one.
-        *ages =
-            u32::from_le_bytes([arm_age, wheel_age, preload_sensor_age, compression_sensor_age]);
+        *ages = u32::from_le_bytes(*code_ages).rotate_left(8);
         for (number, quantity) in quantities.iter_mut().zip(t.quantities()) {
             *number = quantity.to_bits() as u32;
         }
         Self {
             numbers,
             words: [
-                word(*wheel, *preload_sensor),
-                word(*compression_sensor, *arm),
-                word(*drive, *pretightener),
+                word(wheel, preload_sensor),
+                word(compression_sensor, arm),
+                word(bridges[0], bridges[1]),
                 word(t.drive.to_bits() as u16, t.pretightener.to_bits() as u16),
                 u32::from_le_bytes([t.level, t.stage as u8, codes::of_mode(t.mode), 0]),
                 flags.to_bits().into(),
@@ -84,7 +82,6 @@ impl DeltaRecord {
     pub(super) fn record(&self) -> Option<Record> {
         let [at, ages, quantities @ ..] = self.numbers;
         let [wheel_and_cell, tread_and_arm, bridges, duties, state, flags] = self.words;
-        let [arm_age, wheel_age, preload_sensor_age, compression_sensor_age] = ages.to_le_bytes();
         let [level, stage, mode, rest] = state.to_le_bytes();
         let [wheel, preload_sensor] = halves(wheel_and_cell);
         let [compression_sensor, arm] = halves(tread_and_arm);
@@ -96,7 +93,7 @@ impl DeltaRecord {
         Some(Record {
             telemetry: state.with_quantities(quantities.map(|bits| Q16::from_bits(bits as i32))),
             codes: [wheel, preload_sensor, compression_sensor, arm],
-            ages: [wheel_age, preload_sensor_age, compression_sensor_age, arm_age],
+            ages: ages.rotate_right(8).to_le_bytes(),
             bridges: halves(bridges),
             flags: Flags::from_bits(u16::try_from(flags).ok()?),
         })

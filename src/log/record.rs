@@ -4,8 +4,7 @@
 use crate::sense::raw::{
     AdcCode, AngleFrame, BridgeCode, BridgeCodes, EncoderCount, Sample, SensorFrame,
 };
-use crate::supervise::Command;
-use crate::supervise::codes;
+use crate::supervise::{Command, codes};
 use crate::tick::{Input, Output, Telemetry};
 use crate::units::{MotorCommand, Tick};
 
@@ -209,15 +208,8 @@ pub(super) mod tests {
                     let [drive, pretightener] = duties.map(Duty::from_bits);
                     let mode = Mode::WITHOUT_FAULT[mode];
                     let stage = codes::stage(stage).unwrap();
-                    let state = Telemetry {
-                        at,
-                        mode,
-                        stage,
-                        level,
-                        drive,
-                        pretightener,
-                        ..Telemetry::default()
-                    };
+                    let plain = Telemetry::default();
+                    let state = Telemetry { at, mode, stage, level, drive, pretightener, ..plain };
                     let telemetry = state.with_quantities(q.map(Q16::from_bits));
                     Record { telemetry, codes, ages, bridges, flags: Flags::from_bits(flags) }
                 },
@@ -226,6 +218,10 @@ pub(super) mod tests {
 
     fn sample<T>(code: T, at: Tick) -> Option<Sample<T>> {
         Some(Sample { code, at })
+    }
+
+    fn output_at(at: Tick) -> Output {
+        Output { telemetry: Telemetry { at, ..Telemetry::default() }, ..Output::default() }
     }
 
     proptest! {
@@ -245,19 +241,15 @@ pub(super) mod tests {
                 preload_sensor: at(1).and_then(|at| sample(AdcCode::new(codes[1]), at)),
                 compression_sensor: at(2).and_then(|at| sample(AdcCode::new(codes[2]), at)),
                 arm_angle: at(3).and_then(|at| sample(AngleFrame::new(codes[3]), at)),
-                bridges: bridges.map(|codes| BridgeCodes {
-                    drive: BridgeCode::new(codes[0]),
-                    pretightener: BridgeCode::new(codes[1]),
+                bridges: bridges.map(|codes| {
+                    let [drive, pretightener] = codes.map(BridgeCode::new);
+                    BridgeCodes { drive, pretightener }
                 }),
             };
             let command = command.map(|index| Command::ALL[index]);
             let input =
                 Input { now, sensors, command, service: None, plan: None, overrun, emergency_stop };
-            let output = Output {
-                telemetry: Telemetry { at: now, ..Telemetry::default() },
-                ..Output::default()
-            };
-            let back = Record::of(&input, &output).input(&SensorFrame::default());
+            let back = Record::of(&input, &output_at(now)).input(&SensorFrame::default());
             prop_assert_eq!(back.sensors, input.sensors);
             prop_assert_eq!((back.now, back.command), (now, command));
             prop_assert_eq!((back.overrun, back.emergency_stop), (overrun, emergency_stop));
@@ -268,11 +260,7 @@ pub(super) mod tests {
             let old = sample(AdcCode::new(7), now - age);
             let frame = SensorFrame { compression_sensor: old, ..SensorFrame::default() };
             let input = Input { now, sensors: frame, ..Input::default() };
-            let output = Output {
-                telemetry: Telemetry { at: now, ..Telemetry::default() },
-                ..Output::default()
-            };
-            let record = Record::of(&input, &output);
+            let record = Record::of(&input, &output_at(now));
             prop_assert_eq!(record.sensors(&frame), frame);
             // Without a tick before, it is at least old.
             let alone = record.sensors(&SensorFrame::default()).compression_sensor.unwrap();

@@ -50,9 +50,8 @@ pub fn compile(name: &str, rig: &Rig) -> Result<heapless::Vec<u8, MAX_SET>, Comp
     let planner = Planner::try_build(rig)?;
     let name = heapless::String::try_from(name).map_err(|_| CompileError::Name)?;
     let mut room = [0; MAX_SET];
-    let written = part(rig, &mut room)?;
-    let (rig_length, parameters) = (written.len() as u16, crc32(written));
-    let calibration = fingerprint(&rig.sense);
+    let rig_length = part(rig, &mut room)?.len() as u16;
+    let (parameters, calibration) = (fingerprint(rig), fingerprint(&rig.sense));
     let header = Header { schema: SCHEMA, name, rig_length, parameters, calibration };
     let content = part(&(header, rig, controller, planner), &mut room)?;
     let mut set = heapless::Vec::from_slice(content).map_err(|_| CompileError::Room)?;

@@ -169,9 +169,8 @@ impl<M: SetMemory> Service<M> {
 
     fn read(&self, offset: u16) -> Result<Response, Refusal> {
         let (_, set) = in_force(&self.memory, self.image)?;
-        let rest = set.get(usize::from(offset)..).unwrap_or_default();
-        let part = rest.get(..rest.len().min(PIECE)).unwrap_or_default();
-        Piece::from_slice(part).map(Response::Piece).map_err(|_| Refusal::Length)
+        let piece = set.iter().skip(offset.into()).take(PIECE).copied().collect();
+        Ok(Response::Piece(piece))
     }
 }
 
@@ -267,19 +266,16 @@ mod tests {
     #[test]
     fn a_damaged_set_is_told_and_can_be_replaced() {
         let mut service = service();
-        for restore in [true, false] {
+        type Repair = fn(&mut Service<Flash>) -> Response;
+        let restore: Repair = |service| ask(service, Request::Restore);
+        let replace: Repair = |service| send(service, &set("again"));
+        for (repair, name) in [(restore, "image"), (replace, "again")] {
             send(&mut service, &set("mine"));
             service.memory.flip(500);
             for request in [Request::Describe, Request::Read { offset: 0 }] {
                 assert_eq!(ask(&mut service, request), Response::Refused(Refusal::Lost));
             }
-            let done = if restore {
-                ask(&mut service, Request::Restore)
-            } else {
-                send(&mut service, &set("again"))
-            };
-            assert_eq!(done, Response::Done);
-            let name = if restore { "image" } else { "again" };
+            assert_eq!(repair(&mut service), Response::Done);
             assert_eq!(origin(&mut service).1, name);
         }
     }

@@ -4,8 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{SNAPSHOT_WORDS, check};
 use crate::sense::Zeros;
-use crate::supervise::Mode;
-use crate::supervise::codes;
+use crate::supervise::{Mode, codes};
 use crate::units::{Millimetres, MillimetresPerSecond, Q16, Tick};
 
 /// Speed reference of a tick, signed outwards, in 1/32 mm/s; the last bit is whether the

@@ -190,40 +190,38 @@ fn what_a_start_keeps_is_where_the_wheel_came_to_rest_and_unsure() {
 
 #[test]
 fn a_report_names_what_is_known() {
-    let restart = Restart { reset: Reset::Power, snapshot: None, crash: None };
-    assert_eq!(restart.to_string(), "started: power came up");
-    let hung = Restart { reset: Reset::Watchdog, ..restart };
-    assert_eq!(hung.to_string(), "started: by the watchdog; a hang with interrupts shut out");
+    let power = Restart { reset: Reset::Power, snapshot: None, crash: None };
     let crash = |stopped| Some(Crash { build: 1, stopped });
-    let fell = Restart { crash: crash(Stopped::Supply), ..restart };
-    assert_eq!(fell.to_string(), "started: power came up; the supply fell too low");
-    let turned = Restart { reset: Reset::Software, crash: crash(Stopped::Image), ..restart };
-    let text = "started: by software or debugger; a bit of the image had turned over";
-    assert_eq!(turned.to_string(), text);
     let away = DriveSnapshot { tick: 9, mode: 6, level: DriveSnapshot::UNSURE | 1, ..EMPTY };
-    let again = Restart { reset: Reset::Pin, snapshot: Some(away), crash: None };
-    assert_eq!(
-        again.to_string(),
-        "started: by the reset pin; before: deploying: approach at 0.009 s, 0.00 mm, level 1, \
-         its place unsure"
-    );
-    let snapshot = DriveSnapshot {
-        tick: 9,
-        mode: 6,
-        level: 1,
-        fault: 122,
-        missed: MissedCheckIns::TICK,
-        ..EMPTY
-    };
-    let stopped = Stopped::Hang { pc: 16, lr: 32, missed: MissedCheckIns::STARVED, at: 80 };
-    let crash = Some(Crash { build: 1, stopped });
-    let text = Restart { reset: Reset::Watchdog, snapshot: Some(snapshot), crash }.to_string();
-    assert_eq!(
-        text,
-        "started: by the watchdog; the control tick, kept from the processor did not come, \
-         at 0x10 from 0x20; before: deploying: approach at 0.009 s, 0.00 mm, level 1, \
-         last fault 122, the control tick was late"
-    );
+    let missed = MissedCheckIns::TICK;
+    let late = DriveSnapshot { level: 1, fault: 122, missed, ..away };
+    let hang = Stopped::Hang { pc: 16, lr: 32, missed: MissedCheckIns::STARVED, at: 80 };
+    let watchdog = Restart { reset: Reset::Watchdog, ..power };
+    for (restart, text) in [
+        (power, "power came up"),
+        (watchdog, "by the watchdog; a hang with interrupts shut out"),
+        (
+            Restart { crash: crash(Stopped::Supply), ..power },
+            "power came up; the supply fell too low",
+        ),
+        (
+            Restart { reset: Reset::Software, crash: crash(Stopped::Image), ..power },
+            "by software or debugger; a bit of the image had turned over",
+        ),
+        (
+            Restart { reset: Reset::Pin, snapshot: Some(away), crash: None },
+            "by the reset pin; before: deploying: approach at 0.009 s, 0.00 mm, level 1, \
+             its place unsure",
+        ),
+        (
+            Restart { snapshot: Some(late), crash: crash(hang), ..watchdog },
+            "by the watchdog; the control tick, kept from the processor did not come, \
+             at 0x10 from 0x20; before: deploying: approach at 0.009 s, 0.00 mm, level 1, \
+             last fault 122, the control tick was late",
+        ),
+    ] {
+        assert_eq!(restart.to_string(), format!("started: {text}"));
+    }
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! The tasks below the control rate: model, operator, host line and journal.
 
+use core::iter;
 use core::pin::pin;
 
 use super::ROUND;
@@ -125,10 +126,9 @@ pub async fn journal(
         exchange.liveness.running(TaskId::Journal);
         match news {
             Ok(Either::First(entry)) => {
-                write(&mut journal, encoder, &entry);
+                let more = iter::from_fn(|| exchange.entries.try_receive().ok());
                 // At most a queue full before the next check-in.
-                for _ in 1..ENTRIES {
-                    let Ok(entry) = exchange.entries.try_receive() else { break };
+                for entry in iter::once(entry).chain(more).take(ENTRIES) {
                     write(&mut journal, encoder, &entry);
                 }
                 let lost = exchange.lost_entries();
