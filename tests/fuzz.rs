@@ -114,7 +114,7 @@ fn read_frame(bytes: &[u8]) {
 
 /// A frame with as much of a body as has room.
 fn framed(head: Head, body: &[u8]) -> Vec<u8> {
-    let mut page = FrameBuffer::new();
+    let mut page = FrameBuffer::EMPTY;
     let frame = page.write(head, |room| {
         let length = body.len().min(room.len());
         room[..length].copy_from_slice(&body[..length]);

@@ -66,13 +66,11 @@ fn checksums() -> (u32, Option<u32>) {
 /// start of the image.
 pub(crate) fn verify() -> Option<u32> {
     let (now, first) = checksums();
-    match first {
-        None => store(now),
-        Some(first) if first != now => {
-            log_damaged();
-            return None;
-        }
-        Some(_) => {}
+    if first.is_none() {
+        store(now);
+    } else if first != Some(now) {
+        log_damaged();
+        return None;
     }
     Some(now)
 }

@@ -22,10 +22,7 @@ pub(crate) use button::Button;
 use readback::Readback;
 pub(crate) use wheel::Wheel;
 
-/// The preload sensor's converter.
 pub(crate) type PreloadSensor = Analog;
-
-/// The compression sensor's converter.
 pub(crate) type CompressionSensor = Analog;
 
 static PRELOAD_SENSOR: Ring = Ring::new();

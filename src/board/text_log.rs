@@ -99,16 +99,15 @@ impl Journal for TextLog {
             Event::Limit(limit) => {
                 warn!("[{=u32} ms] limit {=u16}: {=str}", at, limit.code(), limit.sentence());
             }
-            Event::Lost(entries) => {
-                warn!("[{=u32} ms] {=u32} log entries lost", at, entries);
-            }
+            Event::Lost(entries) => warn!("[{=u32} ms] {=u32} log entries lost", at, entries),
             Event::Crossing(record) => crossing(at, &record),
             Event::Service(ServiceDuties { drive, pretightener }) => {
                 let percent = |duty: Duty| i32::from(duty.to_bits()) * 100 / 32_768;
-                let (drive, pretightener) = (percent(drive), percent(pretightener));
                 info!(
                     "[{=u32} ms] service: drive {=i32} %, pre-tightener {=i32} %",
-                    at, drive, pretightener
+                    at,
+                    percent(drive),
+                    percent(pretightener)
                 );
             }
             Event::Slip(slip) => {

@@ -182,6 +182,12 @@ mod tests {
         assert!(up.len() < RING, "{}", up.len());
     }
 
+    /// What a reader makes of the message's frame.
+    fn framed<T: Serialize + for<'de> Deserialize<'de>>(message: &T) -> Option<T> {
+        let mut reader = FrameReader::new();
+        frame(message)?.iter().find_map(|byte| reader.take(*byte))
+    }
+
     proptest! {
         #[test]
         fn messages_come_back_from_their_frames(
@@ -206,13 +212,10 @@ mod tests {
             let silent = Given { wheel_encoder: codes[0], stop, ..Given::default() };
             prop_assert_eq!(given.silent(), silent);
             let sent = ToBoard::Tick(tick, given);
-            let mut gatherer = FrameReader::new();
-            let come = frame(&sent).unwrap().iter().find_map(|byte| gatherer.take(*byte));
-            prop_assert_eq!(come, Some(sent));
+            prop_assert_eq!(framed(&sent), Some(sent));
             let taken = Taken { drive: duties[0], preload: duties[1], mode: 3 };
             let sent = ToHost::Done(tick, taken);
-            let come = frame(&sent).unwrap().iter().find_map(|byte| gatherer.take(*byte));
-            prop_assert_eq!(come, Some(sent));
+            prop_assert_eq!(framed(&sent), Some(sent));
             let (drive, preload) = taken.commands();
             prop_assert_eq!(Taken::new(drive, preload, 3), taken);
         }

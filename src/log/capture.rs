@@ -169,8 +169,7 @@ impl Capture {
     pub fn chunk(&self) -> Option<CaptureChunk> {
         let Progress::Draining(trigger, at, first) = self.progress else { return None };
         let rest = self.samples.oldest_ordered().skip(usize::from(first));
-        let samples: Vec<CaptureSample, CHUNK_SAMPLES> =
-            rest.take(CHUNK_SAMPLES).copied().collect();
+        let samples = rest.take(CHUNK_SAMPLES).copied().collect();
         Some(CaptureChunk { trigger, at, first, of: self.samples.len() as u8, samples })
     }
 

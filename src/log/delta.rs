@@ -48,12 +48,10 @@ impl DeltaRecord {
     /// Zeros: the first record of a frame is coded as the difference from them.
     pub(super) const ZERO: Self = Self { numbers: [0; NUMBERS], words: [0; WORDS] };
 
-    /// The tick.
     pub(super) const fn at(&self) -> u32 {
         self.numbers[0]
     }
 
-    /// The record as numbers.
     pub(super) fn of(record: &Record) -> Self {
         let Record { telemetry: t, codes, ages: code_ages, bridges, flags } = record;
         let [wheel, preload_sensor, compression_sensor, arm] = *codes;

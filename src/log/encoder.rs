@@ -40,9 +40,9 @@ impl LogEncoder {
             sequence: 0,
             dropped: 0,
             capture: Capture::new(),
-            ledger: Ledger::new(),
+            ledger: Ledger::EMPTY,
             ticks: TicksFrame::new(),
-            buffer: FrameBuffer::new(),
+            buffer: FrameBuffer::EMPTY,
         }
     }
 

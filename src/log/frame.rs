@@ -61,15 +61,10 @@ pub enum Kind {
 
 impl Kind {
     /// Every kind.
-    pub const ALL: [Self; 7] = [
-        Self::Identity,
-        Self::Ticks,
-        Self::Plan,
-        Self::Request,
-        Self::Event,
-        Self::CaptureChunk,
-        Self::Ledger,
-    ];
+    pub const ALL: [Self; 7] = {
+        use Kind::{CaptureChunk, Event, Identity, Ledger, Plan, Request, Ticks};
+        [Identity, Ticks, Plan, Request, Event, CaptureChunk, Ledger]
+    };
 }
 
 /// Head of a frame.
@@ -88,17 +83,9 @@ pub struct Head {
 #[repr(align(4))]
 pub struct FrameBuffer([u8; LONGEST]);
 
-impl Default for FrameBuffer {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 impl FrameBuffer {
     /// An empty buffer.
-    pub const fn new() -> Self {
-        Self([0; LONGEST])
-    }
+    pub const EMPTY: Self = Self([0; LONGEST]);
 
     /// Builds a frame in the buffer and returns it; `fill` writes the body and returns its
     /// length, bytes.
@@ -177,11 +164,9 @@ pub enum Found<'a> {
 /// Finds what bytes begin with.
 pub fn find(bytes: &[u8]) -> Found<'_> {
     let begins = |at: &usize| SYNC.starts_with(&bytes[*at..bytes.len().min(at + SYNC.len())]);
-    match (0..bytes.len()).find(begins) {
-        Some(0) => {}
-        Some(garbage) => return Found::Garbage(garbage),
-        None if bytes.is_empty() => return Found::Part,
-        None => return Found::Garbage(bytes.len()),
+    let garbage = (0..bytes.len()).find(begins).unwrap_or(bytes.len());
+    if garbage > 0 {
+        return Found::Garbage(garbage);
     }
     let Some((start, rest)) = bytes.split_first_chunk::<HEAD>() else { return Found::Part };
     let &[_, _, _, _, a, b, kind, zero, ..] = start;
@@ -275,12 +260,10 @@ pub(super) struct TicksFrame {
 }
 
 impl TicksFrame {
-    /// An empty frame.
     pub(super) const fn new() -> Self {
-        Self { buffer: FrameBuffer::new(), before: DeltaRecord::ZERO, length: 0, ticks: 0 }
+        Self { buffer: FrameBuffer::EMPTY, before: DeltaRecord::ZERO, length: 0, ticks: 0 }
     }
 
-    /// Number of its ticks.
     pub(super) const fn ticks(&self) -> usize {
         self.ticks
     }
@@ -391,7 +374,7 @@ mod tests {
 
         #[test]
         fn a_sync_inside_a_frame_is_content(kind in any::<u8>(), at in 0..BODY - 4, length in any::<u16>()) {
-            let mut buffer = FrameBuffer::new();
+            let mut buffer = FrameBuffer::EMPTY;
             let bytes = buffer.write(Head { kind, sequence: 5, dropped: 0 }, |body| {
                 body.fill(0);
                 body[at..at + 4].copy_from_slice(&SYNC);
@@ -409,7 +392,7 @@ mod tests {
     #[test]
     fn the_longest_body_fits() {
         let most = Head { kind: u8::MAX, sequence: u32::MAX, dropped: u32::MAX };
-        let mut buffer = FrameBuffer::new();
+        let mut buffer = FrameBuffer::EMPTY;
         let bytes = buffer.write(most, |body| {
             body.fill(0xA5);
             BODY + 7

@@ -36,7 +36,7 @@ pub struct Line {
 }
 
 /// State of the ledger between its lines.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub struct Ledger {
     count: u16,
     /// Dip of the latest corner.
@@ -48,9 +48,8 @@ pub struct Ledger {
 
 impl Ledger {
     /// A ledger without lines.
-    pub const fn new() -> Self {
-        Self { count: 0, dip: Q16::ZERO, on_corner: false, scale: None, trend: Q16::ZERO }
-    }
+    pub const EMPTY: Self =
+        Self { count: 0, dip: Q16::ZERO, on_corner: false, scale: None, trend: Q16::ZERO };
 
     /// Takes one tick into account.
     pub fn look(&mut self, record: &Record) {
@@ -131,7 +130,7 @@ pub(super) mod tests {
 
     #[test]
     fn the_dip_is_that_of_the_corner_alone() {
-        let mut ledger = Ledger::default();
+        let mut ledger = Ledger::EMPTY;
         for (stage, speed) in [
             (ContactStage::Continuous, -1.0),
             (ContactStage::StaticFriction, -7.5),
@@ -150,7 +149,7 @@ pub(super) mod tests {
 
     #[test]
     fn slip_counts_the_way_the_wheel_goes() {
-        let mut ledger = Ledger::default();
+        let mut ledger = Ledger::EMPTY;
         let out = ledger.close(1, &crossing(Direction::Deploy, 1.0));
         let back = ledger.close(2, &crossing(Direction::Retract, 1.0));
         assert_eq!((out.slip, out.count), (Q16::from_num(0.1), 1));
@@ -160,7 +159,7 @@ pub(super) mod tests {
 
     #[test]
     fn a_tread_that_softens_evenly_shows_its_rate() {
-        let mut ledger = Ledger::default();
+        let mut ledger = Ledger::EMPTY;
         let mut trend = 0.0;
         for step in 0..40 {
             let scale = 1.1 - 0.004 * f64::from(step);

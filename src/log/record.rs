@@ -216,10 +216,6 @@ pub(super) mod tests {
             )
     }
 
-    fn sample<T>(code: T, at: Tick) -> Option<Sample<T>> {
-        Some(Sample { code, at })
-    }
-
     fn output_at(at: Tick) -> Output {
         Output { telemetry: Telemetry { at, ..Telemetry::default() }, ..Output::default() }
     }
@@ -237,10 +233,10 @@ pub(super) mod tests {
         ) {
             let at = |sensor: usize| ages[sensor].map(|age| now.wrapping_sub(age as u32));
             let sensors = SensorFrame {
-                wheel_encoder: at(0).and_then(|at| sample(EncoderCount::new(codes[0]), at)),
-                preload_sensor: at(1).and_then(|at| sample(AdcCode::new(codes[1]), at)),
-                compression_sensor: at(2).and_then(|at| sample(AdcCode::new(codes[2]), at)),
-                arm_angle: at(3).and_then(|at| sample(AngleFrame::new(codes[3]), at)),
+                wheel_encoder: at(0).map(|at| Sample { code: EncoderCount::new(codes[0]), at }),
+                preload_sensor: at(1).map(|at| Sample { code: AdcCode::new(codes[1]), at }),
+                compression_sensor: at(2).map(|at| Sample { code: AdcCode::new(codes[2]), at }),
+                arm_angle: at(3).map(|at| Sample { code: AngleFrame::new(codes[3]), at }),
                 bridges: bridges.map(|codes| {
                     let [drive, pretightener] = codes.map(BridgeCode::new);
                     BridgeCodes { drive, pretightener }
@@ -257,7 +253,7 @@ pub(super) mod tests {
 
         #[test]
         fn a_code_too_old_to_tell_keeps_its_time(now in 1000..u32::MAX, age in 246..900_u32) {
-            let old = sample(AdcCode::new(7), now - age);
+            let old = Some(Sample { code: AdcCode::new(7), at: now - age });
             let frame = SensorFrame { compression_sensor: old, ..SensorFrame::default() };
             let input = Input { now, sensors: frame, ..Input::default() };
             let record = Record::of(&input, &output_at(now));

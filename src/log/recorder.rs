@@ -44,8 +44,7 @@ mod tests {
     use crate::estimate::PositionConfidence::{Guess, Sure, Unsure};
     use crate::fault::Fault;
     use crate::supervise::Leg;
-    use crate::units::Direction;
-    use crate::units::Q16;
+    use crate::units::{Direction, Q16};
 
     #[test]
     fn the_last_fault_is_kept_beyond_its_hold() {

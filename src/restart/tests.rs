@@ -74,13 +74,11 @@ proptest! {
 
 #[test]
 fn the_later_place_counts_also_when_the_clock_wraps() {
-    let at = |tick| {
-        Some(DriveSnapshot::open(&[0; SNAPSHOT_WORDS]).unwrap_or(DriveSnapshot { tick, ..EMPTY }))
-    };
-    assert_eq!(later(at(7), at(8)), at(8));
-    assert_eq!(later(at(8), at(7)), at(8));
-    assert_eq!(later(at(u32::MAX), at(0)), at(0));
-    assert_eq!(later(at(0), at(u32::MAX)), at(0));
+    let at = |tick| Some(DriveSnapshot { tick, ..EMPTY });
+    for (before, after) in [(7, 8), (u32::MAX, 0)] {
+        assert_eq!(later(at(before), at(after)), at(after));
+        assert_eq!(later(at(after), at(before)), at(after));
+    }
     assert_eq!((later(None, at(3)), later(at(3), None)), (at(3), at(3)));
     assert_eq!(later(None, None), None);
 }
@@ -123,12 +121,10 @@ fn the_place_is_the_record_s_and_the_way_gone_after_it() {
     let packed_speed = PackedSpeed::of(Q16::from_num(-40), true);
     let snapshot = DriveSnapshot { tick: 900, position: Q16::from_num(30), packed_speed, ..EMPTY };
     let restart = |reset, crash| Restart { reset, snapshot: Some(snapshot), crash };
-    let at = |restart: Restart| {
-        restart.place().map(|place| (place.position.to_num::<f64>(), place.sure))
-    };
-    let near = |restart, mm: f64, sure| {
-        let (position, is_sure) = at(restart).expect("a place");
-        assert!((position - mm).abs() < 1e-3 && is_sure == sure, "{restart}: {position}");
+    let near = |restart: Restart, mm: f64, sure| {
+        let place = restart.place().expect("a place");
+        let position = place.position.to_num::<f64>();
+        assert!((position - mm).abs() < 1e-3 && place.sure == sure, "{restart}: {position}");
     };
     near(restart(Reset::Pin, None), 29.92, true);
     near(restart(Reset::Watchdog, None), 30.0 - 40.0 * 0.102, false);
@@ -139,10 +135,9 @@ fn the_place_is_the_record_s_and_the_way_gone_after_it() {
     near(restart(Reset::Software, crash(Stopped::Panic { place: 1, line: 2 })), 29.92, true);
     // A dip, one that lasts until the watchdog bites, and a supply that was away: nobody
     // knows for how long.
-    near(restart(Reset::Software, crash(Stopped::Supply)), 29.92, false);
-    near(restart(Reset::Watchdog, crash(Stopped::Supply)), 29.92, false);
-    near(restart(Reset::Pin, crash(Stopped::Supply)), 29.92, false);
-    near(restart(Reset::Power, crash(Stopped::Supply)), 29.92, false);
+    for reset in [Reset::Software, Reset::Watchdog, Reset::Pin, Reset::Power] {
+        near(restart(reset, crash(Stopped::Supply)), 29.92, false);
+    }
     // Not confirmed by any step.
     let since = DriveSnapshot { level: DriveSnapshot::UNSURE | 2, ..snapshot };
     near(Restart { snapshot: Some(since), ..restart(Reset::Pin, None) }, 29.92, false);

@@ -13,7 +13,6 @@ use super::host_io::{self, PRESSED};
 use crate::board::rtt::Frames;
 use crate::board::{Console, Guard, Lamp, ParameterFlash, Parts, TextLog};
 
-/// The wheel's counter.
 pub(crate) struct Wheel;
 
 impl WheelEncoder for Wheel {
@@ -23,7 +22,6 @@ impl WheelEncoder for Wheel {
 }
 
 pub(crate) type PreloadSensor = Analog;
-
 pub(crate) type CompressionSensor = Analog;
 
 /// One of the two analogue sensors.
@@ -35,7 +33,6 @@ impl AnalogInput for Analog {
     }
 }
 
-/// The arm's angle sensor.
 pub(crate) struct Angle;
 
 impl AngleBus for Angle {
@@ -44,7 +41,6 @@ impl AngleBus for Angle {
     }
 }
 
-/// The host's bridges.
 pub(crate) struct Bridges;
 
 impl Motors for Bridges {

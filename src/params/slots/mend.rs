@@ -6,40 +6,36 @@
 use super::{Damaged, Draft, PAGE_BYTES, Refusal, SLOT_BYTES, SetMemory, Slot, WORD_BYTES, stored};
 
 /// Erases what cannot be read. A set in force that is intact, though a part of its slot is not,
-/// is saved again first. A damaged set in force stays as it is: the start reports it.
+/// is saved again first, in the other slot. A damaged set in force stays as it is: the start
+/// reports it.
 ///
 /// # Errors
 /// [`Refusal`] if the set cannot be saved again, or the flash failed.
 pub async fn mend(memory: &mut impl SetMemory) -> Result<(), Refusal> {
-    let torn = |memory: &_, slot| !SetMemory::is_readable(memory, slot);
     let in_force = match stored(memory) {
         Ok(found) => found.map(|stored| (stored.slot, stored.set.len())),
         Err(Damaged(_)) => return Ok(()),
     };
     if let Some((slot, length)) = in_force
-        && torn(memory, slot)
+        && !memory.is_readable(slot)
     {
-        save_again(memory, slot, length).await?;
+        let end = super::PREFIX + length;
+        let mut draft = Draft::begin(memory, length).await?;
+        while draft.missing() > 0 {
+            let rest = memory.bytes(slot).get(end - draft.missing()..end).ok_or(Refusal::Length)?;
+            let word: heapless::Vec<u8, WORD_BYTES> =
+                rest.iter().copied().take(WORD_BYTES).collect();
+            draft.append(memory, &word).await?;
+        }
+        draft.seal(memory).await?;
     }
     let in_force = stored(memory)?.map(|stored| stored.slot);
     for slot in [Slot::A, Slot::B] {
-        if in_force != Some(slot) && torn(memory, slot) {
+        if in_force != Some(slot) && !memory.is_readable(slot) {
             for page in 0..SLOT_BYTES / PAGE_BYTES {
                 memory.erase(slot, page).await?;
             }
         }
     }
     Ok(())
-}
-
-/// Saves the set in force, which is in this slot, into the other one.
-async fn save_again(memory: &mut impl SetMemory, slot: Slot, length: usize) -> Result<(), Refusal> {
-    let mut draft = Draft::begin(memory, length).await?;
-    while draft.missing() > 0 {
-        let end = super::PREFIX + length;
-        let rest = memory.bytes(slot).get(end - draft.missing()..end).ok_or(Refusal::Length)?;
-        let word: heapless::Vec<u8, WORD_BYTES> = rest.iter().copied().take(WORD_BYTES).collect();
-        draft.append(memory, &word).await?;
-    }
-    draft.seal(memory).await
 }

@@ -54,10 +54,6 @@ impl Flash {
             }
         }
     }
-
-    fn restart(&self) -> Self {
-        Self { left: None, ..self.clone() }
-    }
 }
 
 impl SetMemory for Flash {
@@ -179,7 +175,7 @@ fn power_lost_at_any_operation_leaves_the_old_set_or_the_new() {
                 flash.left = Some(cut);
                 flash.noise = flash.noise.wrapping_mul(2 * seed + 1);
                 assert_eq!(block_on(save(&mut flash, &new)), Err(Refusal::Flash), "{cut}");
-                let mut after = flash.restart();
+                let mut after = Flash { left: None, ..flash };
                 let before = name(&after);
                 block_on(mend(&mut after)).unwrap();
                 assert!(after.torn.is_empty(), "cut at {cut}: {:?}", after.torn);
