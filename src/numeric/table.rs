@@ -70,15 +70,11 @@ impl<const N: usize> Table<N> {
             shift += 1;
         }
         let table = Self { lo, hi, factor, shift, samples };
-        let mut index = 0;
-        while index < N - 1 {
-            let [_, linear, square, cube] = table.cubic(index);
-            if !(within(linear) && within(square) && within(cube)) {
-                return None;
-            }
-            index += 1;
-        }
-        Some(table)
+        let tame = (0..N - 1).all(|index| {
+            let [_, coefficients @ ..] = table.cubic(index);
+            coefficients.iter().all(|coefficient| coefficient.abs() < COEFFICIENT_LIMIT)
+        });
+        tame.then_some(table)
     }
 
     /// Value at `x`; that of the nearer end outside.
@@ -122,10 +118,6 @@ impl<const N: usize> Table<N> {
         // The index is below N by construction; the check spares a panic.
         if index < N { self.samples[index] as i64 } else { self.samples[N - 1] as i64 }
     }
-}
-
-fn within(coefficient: i64) -> bool {
-    coefficient > -COEFFICIENT_LIMIT && coefficient < COEFFICIENT_LIMIT
 }
 
 #[cfg(test)]
