@@ -92,18 +92,15 @@ impl Schedule {
 
     /// What to ask for.
     pub fn targets(&self, steps: &Steps, plan: &Plan, course: &Course) -> Targets {
-        let within =
-            |from: Option<Millimetres>, distance| from.is_some_and(|from| from <= distance);
         let sight = self.sight(plan, course);
         // To where the corner is felt, by the table or the corner itself.
         let ahead = course.distance.map(|distance| distance - plan.approach.brake_from);
         let earliest = if course.felt { ahead } else { ahead.map(|at| at - steps.tolerance()) };
         let ramping = course.ramping
             || course.critical
-            || within(
-                earliest,
-                self.ramp_distance(plan, course.reference.min(plan.cruise_preload)),
-            );
+            || earliest.is_some_and(|at| {
+                at <= self.ramp_distance(plan, course.reference.min(plan.cruise_preload))
+            });
         let preload = if ramping { plan.ramp_preload } else { plan.cruise_preload };
         // Without look-ahead the preload between the steps is the one to have there.
         let due = if plan.look_ahead { plan.cross_preload } else { plan.cruise_preload };
