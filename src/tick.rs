@@ -235,19 +235,16 @@ impl Controller {
         if !state.mode.moves() {
             return;
         }
-        let standing_since = state.approach.standing_since;
-        let pressed = tick.pressed();
-        let limited_by = state.planning.plan.as_ref().map(|plan| plan.limited_by);
-        let most = state.planning.plan.as_ref().map_or(Q16::MAX, |plan| plan.most_preload);
-        let short = most - tick.sensed.preload_filtered;
+        let plan = state.planning.plan.as_ref();
+        let most = plan.map_or(Q16::MAX, |plan| plan.most_preload);
         let follow = Follow {
             now: tick.now,
             sensed: tick.sensed,
-            pressed,
+            pressed: tick.pressed(),
             duty: state.speed_loop.duty(),
-            most_pressed: short <= self.schedule.reached_within(),
-            standing_since,
-            limited_by,
+            most_pressed: most - tick.sensed.preload_filtered <= self.schedule.reached_within(),
+            standing_since: state.approach.standing_since,
+            limited_by: plan.map(|plan| plan.limited_by),
         };
         let found = self.estimator.follow(&mut state.estimate, &follow);
         self.take_findings(state, tick, found);

@@ -2,9 +2,9 @@
 
 #![deny(clippy::float_arithmetic)]
 
-use super::freshness::{Freshness, Reading, Reason};
+use super::freshness::{Filtered, LastGood, Reason};
 use super::raw::{AdcCode, Sample};
-use crate::numeric::{LowPass, LowPassState};
+use crate::numeric::LowPass;
 use crate::rig::RigError;
 use crate::units::{Q16, Tick};
 
@@ -48,22 +48,10 @@ pub struct AnalogChannel {
 /// State of an [`AnalogChannel`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct AnalogState {
-    freshness: Freshness,
-    /// Last good value before the offset.
-    uncorrected: Q16,
+    /// Before the offset.
+    uncorrected: LastGood,
     offset: Q16,
-    /// Filter of the uncorrected value; none before the first.
-    filter: Option<LowPassState>,
     zeroing: Zeroing,
-}
-
-/// What an [`AnalogChannel`] gives.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct AnalogOutput {
-    /// The newest good value.
-    pub reading: Reading<Q16>,
-    /// The same through the low-pass.
-    pub filtered: Q16,
 }
 
 /// Progress of taking the zero.
@@ -117,45 +105,29 @@ impl AnalogChannel {
         now: Tick,
         sample: Option<Sample<AdcCode>>,
         limit: u32,
-    ) -> AnalogOutput {
-        if let Some(sample) = state.freshness.take(sample) {
-            let code = sample.code.get();
-            if (self.low..=self.high).contains(&code) {
-                state.freshness.judge(Ok(()));
-                state.uncorrected = self.value(code);
-                self.accumulate(state);
-            } else {
-                state.freshness.judge(Err(Reason::OutOfRange));
-            }
+    ) -> Filtered {
+        if state.uncorrected.take(sample, |code| self.value(code.get())) {
+            self.accumulate(state);
         }
-        // The filter runs on the held value in every tick, whatever the jitter of the samples.
-        let filtered = match &mut state.filter {
-            Some(filter) => self.filter.step(filter, state.uncorrected),
-            none => {
-                *none = state.freshness.good().map(|_| LowPassState::at(state.uncorrected));
-                state.uncorrected
-            }
-        };
-        let value = state.uncorrected - state.offset;
-        AnalogOutput {
-            reading: state.freshness.reading(value, now, limit),
-            filtered: filtered - state.offset,
-        }
+        state.uncorrected.step(&self.filter, state.offset, now, limit)
     }
 
-    /// A good code in units, before the offset.
-    fn value(&self, code: u16) -> Q16 {
+    /// The code of an intact bridge in units, before the offset.
+    fn value(&self, code: u16) -> Result<Q16, Reason> {
+        if !(self.low..=self.high).contains(&code) {
+            return Err(Reason::OutOfRange);
+        }
         let above = i64::from((i32::from(code) << 8) - self.zero);
         // Q8 x Q32 = Q40 to Q16, rounded.
         let bits = (above * i64::from(self.gain) + (1 << 23)) >> 24;
-        Q16::saturating_from_bits(bits)
+        Ok(Q16::saturating_from_bits(bits))
     }
 
     fn accumulate(&self, state: &mut AnalogState) {
         let Zeroing::Running { sum, count } = &mut state.zeroing else {
             return;
         };
-        *sum += i64::from(state.uncorrected.to_bits());
+        *sum += i64::from(state.uncorrected.value.to_bits());
         *count += 1;
         if *count < ZERO_SAMPLES {
             return;
@@ -337,9 +309,9 @@ mod tests {
         for sound in [0.1, 1.0, 20_000.0] {
             assert!(AnalogChannel::try_build("k", sound, 0.005).is_ok(), "{sound}");
         }
-        for (value, named) in [(0.0, 0.0), (-5.0, -5.0), (0.099, 0.099), (20_001.0, 20_001.0)] {
+        for value in [0.0, -5.0, 0.099, 20_001.0] {
             let refused = AnalogChannel::try_build("k", value, 0.005);
-            let error = RigError::OutOfRange { key: "k", value: named, min: 0.1, max: 20_000.0 };
+            let error = RigError::OutOfRange { key: "k", value, min: 0.1, max: 20_000.0 };
             assert_eq!(refused.err(), Some(error));
         }
         assert!(AnalogChannel::try_build("k", f64::NAN, 0.005).is_err());

@@ -2,9 +2,9 @@
 
 #![deny(clippy::float_arithmetic)]
 
-use super::freshness::{Freshness, Reading, Reason};
+use super::freshness::{Filtered, LastGood, Reason};
 use super::raw::{AngleFrame, Sample};
-use crate::numeric::{LowPass, LowPassState};
+use crate::numeric::LowPass;
 use crate::units::{Q16, Tick};
 
 /// Angle from the pillar in codes of the sensor, 16384 a turn, LSB 2^-16 code = 5.9 nrad;
@@ -70,20 +70,7 @@ pub struct AngleSensor {
 
 /// State of an [`AngleSensor`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct AngleState {
-    freshness: Freshness,
-    angle: Codes,
-    filter: Option<LowPassState>,
-}
-
-/// What an [`AngleSensor`] gives.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Angle {
-    /// The newest good angle.
-    pub reading: Reading<Codes>,
-    /// The same through the low-pass.
-    pub filtered: Codes,
-}
+pub struct AngleState(LastGood);
 
 impl AngleSensor {
     /// A sensor reading `zero_code` with the arm along the pillar, for arms that
@@ -102,22 +89,9 @@ impl AngleSensor {
         now: Tick,
         sample: Option<Sample<AngleFrame>>,
         limit: u32,
-    ) -> Angle {
-        if let Some(sample) = state.freshness.take(sample) {
-            let verdict = decode(sample.code).and_then(|code| self.within(code));
-            if let Ok(angle) = verdict {
-                state.angle = angle;
-            }
-            state.freshness.judge(verdict.map(|_| ()));
-        }
-        let filtered = match &mut state.filter {
-            Some(filter) => self.filter.step(filter, state.angle),
-            none => {
-                *none = state.freshness.good().map(|_| LowPassState::at(state.angle));
-                state.angle
-            }
-        };
-        Angle { reading: state.freshness.reading(state.angle, now, limit), filtered }
+    ) -> Filtered {
+        state.0.take(sample, |frame| self.within(decode(frame)?));
+        state.0.step(&self.filter, Codes::ZERO, now, limit)
     }
 
     /// A code as an angle within the arm's reach.
@@ -165,7 +139,6 @@ mod tests {
 
     #[test]
     fn the_diagnostics_confirm_a_field_in_range_alone() {
-        let frame = |bits: u16| AngleFrame::new(bits | ((bits.count_ones() % 2) as u16) << 15);
         for (bits, expected) in [
             (0x0180, Ok(true)),
             (0x01FF, Ok(true)),

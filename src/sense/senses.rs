@@ -5,7 +5,7 @@
 use super::analog::{AnalogChannel, AnalogState, Zeroing};
 use super::angle::{AngleSensor, AngleState};
 use super::arm::Arm;
-use super::freshness::Reading;
+use super::freshness::{Reading, Validity};
 use super::raw::SensorFrame;
 use super::speed::{self, SpeedState, Speedometer};
 use crate::rig::{Rig, RigError};
@@ -164,11 +164,35 @@ impl Senses {
             preload_filtered: preload.filtered,
             compression: compression.reading,
             compression_filtered: compression.filtered,
-            radius: angle.reading.with(radius),
+            radius: Reading { value: radius, ..angle.reading },
             tan_arm,
             steps_up,
             level: state.level.unwrap_or(0),
         }
+    }
+}
+
+impl SensedState {
+    /// Validity of wheel encoder, preload sensor, compression sensor and arm angle.
+    pub const fn validities(&self) -> [Validity; 4] {
+        [
+            self.speed.validity,
+            self.preload.validity,
+            self.compression.validity,
+            self.radius.validity,
+        ]
+    }
+
+    /// The same, to be set.
+    #[cfg(test)]
+    pub(crate) const fn validities_mut(&mut self) -> [&mut Validity; 4] {
+        let Self { speed, preload, compression, radius, .. } = self;
+        [
+            &mut speed.validity,
+            &mut preload.validity,
+            &mut compression.validity,
+            &mut radius.validity,
+        ]
     }
 }
 
@@ -219,7 +243,6 @@ impl SensesState {
 #[cfg(test)]
 #[allow(clippy::float_arithmetic, reason = "the reference is in f64")]
 mod tests {
-    use super::super::freshness::Validity;
     use super::super::raw::{AdcCode, AngleFrame, EncoderCount, Sample};
     use super::*;
 
@@ -288,14 +311,7 @@ mod tests {
         near(sensed.steps_up, 1.0, 0.006);
         assert_eq!(sensed.level, 1);
         assert!((sensed.travel.to_num::<f64>() - 36.0).abs() <= 0.02);
-        for validity in [
-            sensed.speed.validity,
-            sensed.preload.validity,
-            sensed.compression.validity,
-            sensed.radius.validity,
-        ] {
-            assert_eq!(validity, Validity::Valid);
-        }
+        assert_eq!(sensed.validities(), [Validity::Valid; 4]);
     }
 
     #[test]
@@ -314,16 +330,9 @@ mod tests {
                 }
                 sensed = senses.step(&mut state, now, &mixed, Default::default());
             }
-            let validities = [
-                sensed.speed.validity,
-                sensed.preload.validity,
-                sensed.compression.validity,
-                sensed.radius.validity,
-            ];
-            for (sensor, validity) in validities.into_iter().enumerate() {
-                let expected = if sensor == silent { Validity::Stale } else { Validity::Valid };
-                assert_eq!(validity, expected, "sensor {sensor}, silent {silent}");
-            }
+            let mut expected = [Validity::Valid; 4];
+            expected[silent] = Validity::Stale;
+            assert_eq!(sensed.validities(), expected, "silent {silent}");
         }
     }
 

@@ -4,6 +4,7 @@
 
 #![deny(clippy::float_arithmetic)]
 
+use super::monitor::lasts;
 use crate::fault::Fault;
 use crate::numeric::checked;
 use crate::rig::{Rig, RigError, SHORT_PART, START_LAG_MM};
@@ -44,7 +45,7 @@ const TELLING: MillimetresPerSecond = q16(10_000_000);
 const EFFORT: (Ratio, Ratio) = (q16(-50_000), q16(130_000));
 /// Ticks for which it must be outside: more than two time constants of the loop, in which it
 /// settles after a corner.
-const EFFORT_TICKS: u8 = 120;
+const EFFORT_TICKS: u16 = 120;
 /// Dead times and lags of its slew by which a preload may be short: what it makes with these off by
 /// half. At least a part of the cruise preload.
 const SHORT_LATENCIES: f64 = 0.5;
@@ -52,7 +53,7 @@ const SHORT_LATENCIES: f64 = 0.5;
 /// an actuator whose dead time, lag and slew are all off.
 const STRAYED: f64 = 2.5;
 /// Ticks for which it must deviate.
-const STRAYED_TICKS: u8 = 10;
+const STRAYED_TICKS: u16 = 10;
 /// Equal codes in a row that count as stuck if the preload has to change meanwhile, or if nothing
 /// is known of the sensor's noise.
 const STUCK: u16 = 64;
@@ -157,8 +158,8 @@ pub(super) struct CrossState {
     /// Radius and encoder when arm and wheel were last set equal, and the ticks since.
     arm: (Millimetres, Travel),
     arm_ticks: u8,
-    effort: u8,
-    strayed: u8,
+    effort: u16,
+    strayed: u16,
     preload: CodeState,
     compression: CodeState,
 }
@@ -237,16 +238,13 @@ impl CrossCheck {
         noise: &Noise,
         seen: &Compared,
     ) -> Option<Fault> {
-        let (preload, due) = (seen.preload, seen.preload_due);
         let limits = Limits { stuck: noise.preload.stuck, jump: JUMP_N, due: self.telling() };
-        let unsound = judge(&mut state.preload, preload, due, &limits);
+        let unsound = judge(&mut state.preload, seen.preload, seen.preload_due, &limits);
         let off = seen.preload_off.abs() > self.strayed;
         let strayed = lasts(&mut state.strayed, off, STRAYED_TICKS);
-        if unsound {
-            Some(Fault::PreloadSensorImplausible)
-        } else {
-            strayed.then_some(Fault::PretightenerRunaway)
-        }
+        unsound
+            .then_some(Fault::PreloadSensorImplausible)
+            .or(strayed.then_some(Fault::PretightenerRunaway))
     }
 
     /// Deviation by which a preload is short, N.
@@ -280,21 +278,13 @@ impl CrossCheck {
             seen.speed_ref.abs() > TELLING && !(EFFORT.0..=EFFORT.1).contains(&along)
         });
         let effort = lasts(&mut state.effort, effort, EFFORT_TICKS);
-        if bent {
-            Some(Fault::DriveRunaway)
-        } else if preload == Some(Fault::PreloadSensorImplausible) {
-            preload
-        } else if unsound {
-            Some(Fault::CompressionSensorImplausible)
-        } else if arm {
-            Some(Fault::ArmMismatch)
-        } else if lags {
-            Some(Fault::DriveStalled)
-        } else if effort {
-            Some(Fault::DutyMismatch)
-        } else {
-            preload
-        }
+        bent.then_some(Fault::DriveRunaway)
+            .or(preload.filter(|fault| *fault == Fault::PreloadSensorImplausible))
+            .or(unsound.then_some(Fault::CompressionSensorImplausible))
+            .or(arm.then_some(Fault::ArmMismatch))
+            .or(lags.then_some(Fault::DriveStalled))
+            .or(effort.then_some(Fault::DutyMismatch))
+            .or(preload)
     }
 
     /// Whether the wheel leaves its reference: first or second difference of encoder less
@@ -373,12 +363,6 @@ fn judge(state: &mut CodeState, value: Q16, due: Newtons, limits: &Limits) -> bo
         state.erratic.saturating_sub(1)
     };
     state.same >= limits.stuck || sleeps || state.erratic >= ERRATIC
-}
-
-/// Counts ticks while a condition lasts, and whether they are `enough`.
-fn lasts(count: &mut u8, condition: bool, enough: u8) -> bool {
-    *count = if condition { count.saturating_add(1) } else { 0 };
-    *count >= enough
 }
 
 impl CrossState {

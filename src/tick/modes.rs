@@ -3,7 +3,7 @@
 use super::serve::view;
 use super::{Controller, Event, State, TickContext};
 use crate::fault::{Fault, Limit};
-use crate::supervise::startup::{TEST_TICKS, all_answer, at_rest, silent, stowed};
+use crate::supervise::startup::{TEST_TICKS, at_rest, silent, stowed};
 use crate::supervise::{Mode, Trigger, next};
 use crate::units::{Direction, Q16};
 
@@ -67,8 +67,11 @@ impl Controller {
     pub(super) fn advance_mode(&self, state: &mut State, tick: &mut TickContext<'_>) {
         state.in_mode = state.in_mode.saturating_add(1);
         match state.mode {
-            Mode::Boot if all_answer(tick.sensed) => tick.trigger(Trigger::SensorsAnswer),
-            Mode::Boot if state.in_mode >= BOOT_TICKS => tick.fail(silent(tick.sensed)),
+            Mode::Boot => match silent(tick.sensed) {
+                None => tick.trigger(Trigger::SensorsAnswer),
+                Some(fault) if state.in_mode >= BOOT_TICKS => tick.fail(fault),
+                Some(_) => {}
+            },
             Mode::SelfTest => self.await_rest(state, tick),
             Mode::Zero => self.await_zero(state, tick),
             Mode::Preload(direction) => self.await_preload(state, tick, direction),
@@ -147,21 +150,11 @@ impl Controller {
 #[cfg(test)]
 #[allow(clippy::float_arithmetic, reason = "quantities of a test")]
 mod tests {
-    use super::super::tests::{sensed, within};
+    use super::super::tests::{answering, within};
     use super::*;
-    use crate::sense::{SensedState, Validity};
+    use crate::sense::Validity;
     use crate::supervise::Command;
     use crate::units::q16;
-
-    /// Every sensor answers, and the wheel is at rest.
-    fn answering() -> SensedState {
-        let mut all = sensed(0, 0.0, 0.0);
-        all.speed.validity = Validity::Valid;
-        all.preload.validity = Validity::Valid;
-        all.compression.validity = Validity::Valid;
-        all.radius.validity = Validity::Valid;
-        all
-    }
 
     fn advance(controller: &Controller, state: &mut State, tick: &mut TickContext<'_>) {
         controller.advance_mode(state, tick);

@@ -112,18 +112,17 @@ impl State {
 
     /// Speed reference, signed outwards.
     pub(super) fn signed_speed(&self) -> MillimetresPerSecond {
-        match self.estimate.direction {
-            Direction::Deploy => self.profile.speed(),
-            Direction::Retract => -self.profile.speed(),
-        }
+        self.outwards(self.profile.speed())
     }
 
     /// Acceleration reference, signed outwards.
     pub(super) fn acceleration(&self) -> MillimetresPerSecond2 {
-        match self.estimate.direction {
-            Direction::Deploy => self.profile.acceleration(),
-            Direction::Retract => -self.profile.acceleration(),
-        }
+        self.outwards(self.profile.acceleration())
+    }
+
+    /// What is along the run, signed outwards.
+    fn outwards(&self, along: Q16) -> Q16 {
+        if self.estimate.direction == Direction::Deploy { along } else { -along }
     }
 
     /// Part of a corner's feed-forward that is blended in, 0 to 1, after one more tick, and what
