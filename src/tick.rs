@@ -184,13 +184,11 @@ impl Controller {
         let targets = self.targets(state, tick);
         self.transit(state, tick);
         let (drive, preload) = self.actuate(state, tick, &targets);
+        (tick.output.drive, tick.output.preload) = (drive, preload);
+        state.monitor.set_duties(drive.duty, preload.duty);
         self.note_stage(state, tick);
         self.follow_vibration(state, tick);
-        tick.output.drive = drive;
-        tick.output.preload = preload;
         tick.output.telemetry = self.telemetry(state, tick, &targets);
-        let row = &tick.output.telemetry;
-        state.monitor.set_duties(row.drive, row.pretightener);
     }
 
     fn look_for_faults(&self, state: &mut State, tick: &mut TickContext<'_>, input: &Input) {

@@ -59,7 +59,7 @@ pub struct Course {
 }
 
 /// What is asked for.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Targets {
     /// Speed along the run, mm/s.
     pub speed: MillimetresPerSecond,
@@ -367,9 +367,7 @@ mod tests {
             let wanted = if remaining < least { Q16::ZERO } else { plan.cruise_speed };
             prop_assert_eq!(got, wanted);
         }
-    }
 
-    proptest! {
         #[test]
         fn out_of_sight_no_braking_is_due(
             back in any::<bool>(),

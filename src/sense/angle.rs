@@ -68,30 +68,26 @@ pub struct AngleSensor {
     filter: LowPass,
 }
 
-/// State of an [`AngleSensor`].
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct AngleState(LastGood);
-
 impl AngleSensor {
     /// A sensor reading `zero_code` with the arm along the pillar, for arms that
     /// move from `lo` to `hi`.
     #[allow(clippy::float_arithmetic, reason = "SI to machine units, once at start")]
-    pub fn build(zero_code: f64, lo: Codes, hi: Codes, tau_s: f64) -> Self {
+    pub fn build(zero_code: f64, (lo, hi): (Codes, Codes), tau_s: f64) -> Self {
         // Reduced to a turn by the cast's wrap from 64 bits.
         let zero = libm::round(zero_code * f64::from(1_u32 << 18)) as i64 as u32;
         Self { zero, lo, hi, filter: LowPass::build(tau_s) }
     }
 
     /// One tick with the latest sample, new or not; `limit` is the largest age, ticks.
-    pub fn step(
+    pub(super) fn step(
         &self,
-        state: &mut AngleState,
+        state: &mut LastGood,
         now: Tick,
         sample: Option<Sample<AngleFrame>>,
         limit: u32,
     ) -> Filtered {
-        state.0.take(sample, |frame| self.within(decode(frame)?));
-        state.0.step(&self.filter, Codes::ZERO, now, limit)
+        state.take(sample, |frame| self.within(decode(frame)?));
+        state.step(&self.filter, Codes::ZERO, now, limit)
     }
 
     /// A code as an angle within the arm's reach.
@@ -117,7 +113,7 @@ mod tests {
     }
 
     fn sensor(zero: f64) -> AngleSensor {
-        AngleSensor::build(zero, Codes::from_num(100), Codes::from_num(4000), 0.0)
+        AngleSensor::build(zero, (Codes::from_num(100), Codes::from_num(4000)), 0.0)
     }
 
     #[test]
@@ -158,7 +154,7 @@ mod tests {
         for zero in [0.0, 2000.0, 2000.37, 15_000.0, 16_383.0] {
             let sensor = sensor(zero);
             for code in 0..16_384 {
-                let mut state = AngleState::default();
+                let mut state = LastGood::default();
                 let sample = Some(Sample { code: frame(code), at: 1 });
                 let angle = sensor.step(&mut state, 1, sample, LIMIT);
                 let exact = (f64::from(code) - zero + 8192.0).rem_euclid(16_384.0) - 8192.0;
@@ -175,7 +171,7 @@ mod tests {
     #[test]
     fn bad_frames_hold_the_angle() {
         let sensor = sensor(2000.0);
-        let mut state = AngleState::default();
+        let mut state = LastGood::default();
         sensor.step(&mut state, 0, Some(Sample { code: frame(3000), at: 0 }), LIMIT);
         let parity = AngleFrame::new(frame(3500).get() ^ 1);
         let flagged = AngleFrame::new(frame(3500).get() ^ 0xC000);

@@ -3,9 +3,9 @@
 #![deny(clippy::float_arithmetic)]
 
 use super::analog::{AnalogChannel, AnalogState, Zeroing};
-use super::angle::{AngleSensor, AngleState};
+use super::angle::AngleSensor;
 use super::arm::Arm;
-use super::freshness::{Reading, Validity};
+use super::freshness::{LastGood, Reading, Validity};
 use super::raw::SensorFrame;
 use super::speed::{self, SpeedState, Speedometer};
 use crate::rig::{Rig, RigError};
@@ -64,7 +64,7 @@ pub struct SensesState {
     wheel_encoder: SpeedState,
     preload_sensor: AnalogState,
     compression_sensor: AnalogState,
-    arm_angle: AngleState,
+    arm_angle: LastGood,
     level: Option<u8>,
 }
 
@@ -104,7 +104,6 @@ impl Senses {
     #[allow(clippy::float_arithmetic, reason = "SI to machine units, once at start")]
     pub fn try_build_tuned(rig: &Rig, tuning: &Tuning) -> Result<Self, RigError> {
         let arm = Arm::try_build(rig)?;
-        let (lo, hi) = arm.reach();
         Ok(Self {
             wheel_encoder: Speedometer::try_build(rig, tuning.speed_bandwidth_rad_s)?,
             preload_sensor: AnalogChannel::try_build(
@@ -117,7 +116,7 @@ impl Senses {
                 rig.sense.tread_full_scale_mm,
                 tuning.tread_tau_s,
             )?,
-            arm_angle: AngleSensor::build(rig.sense.angle_zero_code, lo, hi, tuning.arm_tau_s),
+            arm_angle: AngleSensor::build(rig.sense.angle_zero_code, arm.reach(), tuning.arm_tau_s),
             arm,
             limit: libm::round(rig.sense.stale_after_s * f64::from(TICK_HZ)) as u32,
         })
@@ -138,19 +137,14 @@ impl Senses {
         acceleration: MillimetresPerSecond2,
     ) -> SensedState {
         let limit = self.limit;
-        let motion = self.wheel_encoder.step(
-            &mut state.wheel_encoder,
-            now,
-            frame.wheel_encoder,
-            acceleration,
-            limit,
-        );
-        let preload = &mut state.preload_sensor;
-        let preload = self.preload_sensor.step(preload, now, frame.preload_sensor, limit);
-        let compression = &mut state.compression_sensor;
-        let compression =
-            self.compression_sensor.step(compression, now, frame.compression_sensor, limit);
-        let angle = self.arm_angle.step(&mut state.arm_angle, now, frame.arm_angle, limit);
+        let SensesState { wheel_encoder, preload_sensor, compression_sensor, arm_angle, .. } =
+            state;
+        let wheel = frame.wheel_encoder;
+        let motion = self.wheel_encoder.step(wheel_encoder, now, wheel, acceleration, limit);
+        let preload = self.preload_sensor.step(preload_sensor, now, frame.preload_sensor, limit);
+        let pressed = frame.compression_sensor;
+        let compression = self.compression_sensor.step(compression_sensor, now, pressed, limit);
+        let angle = self.arm_angle.step(arm_angle, now, frame.arm_angle, limit);
         let (radius, tan_arm) = self.arm.stance(angle.filtered);
         let steps_up = self.arm.steps_up(radius, compression.filtered);
         let level = self.arm.level(state.level, steps_up);

@@ -4,6 +4,8 @@
 
 #![deny(clippy::float_arithmetic)]
 
+use heapless::HistoryBuf;
+
 use super::monitor::lasts;
 use crate::fault::Fault;
 use crate::numeric::checked;
@@ -14,8 +16,6 @@ use crate::units::{
 
 /// Ticks between the three positions of an acceleration.
 const SPAN: usize = 6;
-/// Room for the positions of two spans.
-const KEPT: usize = 16;
 /// Distance by which reference and encoder may bend apart within two spans, counts. Three
 /// readings of a counter are off by less than 2 counts together; a third full count takes
 /// `1 / (6 ms)^2`, 530 mm/s^2 beyond the reference: twice the acceleration of the profile. Of
@@ -141,15 +141,12 @@ const fn run_of(changes: u16) -> u16 {
 }
 
 /// State between ticks.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct CrossState {
     /// Travel of the reference since the drive was switched on.
     reference: Travel,
-    /// Encoder less reference, mm, of the last ticks.
-    past: [Millimetres; KEPT],
-    /// Ticks that they hold, up to [`KEPT`], and where the next one goes.
-    held: u8,
-    head: u8,
+    /// Encoder less reference, mm, of the ticks of the last two spans, the oldest first.
+    past: HistoryBuf<Millimetres, { 2 * SPAN }>,
     at: Tick,
     /// Encoder and reference at the last progress.
     progress: (Travel, Travel),
@@ -294,21 +291,17 @@ impl CrossCheck {
         // A tick without a new reading, or one lost: the times would not be equal.
         let missed = seen.read_at != seen.now || seen.now.wrapping_sub(state.at) != 1;
         state.at = seen.now;
-        let now = Q16::narrow(seen.travel.wrapping_sub(state.reference));
-        let back = |ticks: usize| {
-            let place = usize::from(state.head).wrapping_sub(ticks) % KEPT;
-            state.past.get(place).copied().unwrap_or(now)
-        };
-        let (middle, old) = (back(SPAN), back(2 * SPAN));
-        if let Some(place) = state.past.get_mut(usize::from(state.head)) {
-            *place = now;
-        }
-        state.head = (state.head + 1) % KEPT as u8;
-        if missed || usize::from(state.held) < 2 * SPAN {
-            state.held = if missed { 0 } else { state.held + 1 };
+        if missed {
+            state.past.clear();
             return false;
         }
-        ((now - middle) - (middle - old)).abs() > self.bent || (now - old).abs() > self.off
+        let now = Q16::narrow(seen.travel.wrapping_sub(state.reference));
+        let mut past = state.past.oldest_ordered().copied();
+        let spans = past.next().zip(past.nth(SPAN - 1)).filter(|_| state.past.is_full());
+        state.past.write(now);
+        spans.is_some_and(|(old, middle)| {
+            ((now - middle) - (middle - old)).abs() > self.bent || (now - old).abs() > self.off
+        })
     }
 
     /// Whether the reference goes on while the wheel does not.
@@ -369,8 +362,7 @@ impl CrossState {
     /// Starts with the drive, which has been at rest until now.
     pub(super) fn begin(&mut self, seen: &Compared) {
         *self = Self {
-            past: [Q16::narrow(seen.travel); KEPT],
-            held: 2 * SPAN as u8,
+            past: HistoryBuf::new_with(Q16::narrow(seen.travel)),
             at: seen.now.wrapping_sub(1),
             progress: (seen.travel, Travel::ZERO),
             strayed: self.strayed,

@@ -40,7 +40,7 @@ pub struct Monitor {
 }
 
 /// How long each condition has lasted, ticks.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct MonitorState {
     overpressure: u16,
     runaway: u16,

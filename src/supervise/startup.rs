@@ -50,20 +50,13 @@ pub fn stowed(sensed: &SensedState, pressed: Newtons, zero_limit: Newtons) -> bo
 #[allow(clippy::float_arithmetic, reason = "quantities of a test")]
 mod tests {
     use super::*;
-    use crate::rig::Rig;
-    use crate::sense::raw::SensorFrame;
-    use crate::sense::{Senses, SensesState};
     use crate::units::Q16;
 
     /// Sensor values on this wall, at this speed, preload and compression.
     fn sensed(level: u8, speed: f64, preload: f64, compression: f64) -> SensedState {
-        let senses = Senses::try_build(&Rig::prototype()).expect("sound");
-        let nothing = SensorFrame::default();
-        let mut sensed = senses.step(&mut SensesState::default(), 0, &nothing, Q16::ZERO);
-        sensed.level = level;
+        let mut sensed = crate::estimate::sensed(level, 0.0, compression);
         sensed.speed.value = Q16::from_num(speed);
         sensed.preload_filtered = Q16::from_num(preload);
-        sensed.compression_filtered = Q16::from_num(compression);
         sensed
     }
 

@@ -42,12 +42,10 @@ impl Controller {
     /// Schedule of this tick; holds preload and position while nothing runs.
     pub(super) fn targets(&self, state: &mut State, tick: &mut TickContext<'_>) -> Targets {
         let hold = Targets {
-            speed: Q16::ZERO,
             preload: state.preload_loop.reference(tick.sensed.preload.value),
             ramping: state.approach.ramping,
             begun: state.approach.begun,
-            approaching: false,
-            waiting: false,
+            ..Targets::default()
         };
         let (direction, running) = match state.mode {
             Mode::Preload(direction) => (direction, false),

@@ -181,8 +181,7 @@ mod tests {
 
     #[test]
     fn a_zero_that_is_not_taken_is_a_fault_after_two_seconds() {
-        let mut state = State::default();
-        state.mode = Mode::Zero;
+        let mut state = State { mode: Mode::Zero, ..State::default() };
         state.senses.begin_zero();
         within(&answering(), |controller, pass| {
             for tick in 1..2000 {
@@ -197,8 +196,7 @@ mod tests {
     #[test]
     fn a_wheel_that_does_not_stop_is_a_fault_after_a_second_and_a_half() {
         let stopping = |speed: Q16| {
-            let mut state = State::default();
-            state.mode = Mode::Stopping(Direction::Deploy);
+            let mut state = State { mode: Mode::Stopping(Direction::Deploy), ..State::default() };
             let mut turning = answering();
             turning.speed.value = speed;
             let ticks = within(&turning, |controller, pass| {
@@ -221,8 +219,7 @@ mod tests {
         for limit_n in [50.0, 60.0] {
             rig.preload.limit_n = limit_n;
             let controller = Controller::try_build(&rig).expect("sound");
-            let mut state = State::default();
-            state.mode = Mode::Preload(Direction::Deploy);
+            let mut state = State { mode: Mode::Preload(Direction::Deploy), ..State::default() };
             let ticks = within(&answering(), |_, pass| {
                 (1..20_000).find(|_| {
                     advance(&controller, &mut state, pass);
@@ -239,8 +236,7 @@ mod tests {
     fn bridges_are_armed_again_by_a_reset_from_a_fault_alone() {
         let idle = answering();
         let armed = |from: Mode, trigger: Trigger| {
-            let mut state = State::default();
-            state.mode = from;
+            let mut state = State { mode: from, ..State::default() };
             within(&idle, |controller, pass| {
                 assert!(next(state.mode, trigger).is_some());
                 pass.trigger(trigger);

@@ -169,9 +169,7 @@ mod tests {
 
     /// In motion on the first wall.
     fn running() -> State {
-        let mut state = State::default();
-        state.mode = Mode::Run(Direction::Deploy, Leg::Cruise);
-        state
+        State { mode: Mode::Run(Direction::Deploy, Leg::Cruise), ..State::default() }
     }
 
     #[test]

@@ -38,7 +38,7 @@ pub struct State {
     pub(super) approach: Approach,
     pub(super) service: ServiceState,
     /// Ticks for which a corner has been detected, up to [`BLEND_TICKS`].
-    corner_blend_ticks: u8,
+    pub(super) corner_blend_ticks: u8,
 }
 
 /// The approach to the step ahead; it begins again with the next step and with each run.

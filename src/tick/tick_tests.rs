@@ -71,9 +71,8 @@ pub(super) fn within<T>(
 fn a_reset_right_after_a_fault_is_refused() {
     let idle = sensed(0, 0.0, 0.0);
     for (ticks, taken) in [(0, false), (50, false), (99, false), (100, true), (5000, true)] {
-        let mut state = State::default();
-        state.mode = Mode::FaultHold(Fault::TickOverrun);
-        state.in_mode = ticks;
+        let (mode, in_mode) = (Mode::FaultHold(Fault::TickOverrun), ticks);
+        let mut state = State { mode, in_mode, ..State::default() };
         let events = within(&idle, |controller, pass| {
             controller.take_command(&mut state, pass, Some(Command::Reset));
             pass.output.events.clone()
@@ -133,8 +132,8 @@ fn the_duty_shows_the_load_only_at_a_steady_speed() {
     };
     // At 20 mm/s, reached or accelerating to 30, with an effort far beyond its band.
     let found = |target: i32| {
-        let mut state = State::default();
-        state.mode = Mode::Run(Direction::Deploy, Leg::Cruise);
+        let mut state =
+            State { mode: Mode::Run(Direction::Deploy, Leg::Cruise), ..State::default() };
         let wanted = Q16::from_num(target);
         while state.profile.speed() < Q16::from_num(20) {
             controller.profile.step(&mut state.profile, wanted);
