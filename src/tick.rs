@@ -240,7 +240,7 @@ impl Controller {
             sensed: tick.sensed,
             pressed: tick.pressed(),
             duty: state.speed_loop.duty(),
-            most_pressed: most - tick.sensed.preload_filtered <= self.schedule.reached_within(),
+            most_pressed: most - tick.sensed.preload_filtered <= self.schedule.reached_within,
             standing_since: state.approach.standing_since,
             limited_by: plan.map(|plan| plan.limited_by),
         };

@@ -26,7 +26,7 @@ const END_LATE: Millimetres = q16(30_000);
 pub struct Schedule {
     timing: Timing,
     /// Short of the wanted preload by no more than this, it is reached, N.
-    reached_within: Newtons,
+    pub(crate) reached_within: Newtons,
 }
 
 /// Where the wheel is on its run.
@@ -83,11 +83,6 @@ impl Schedule {
             timing: Timing::try_build(rig)?,
             reached_within: checked("preload.limit_n", rig.preload.limit_n)? * REACHED_PART,
         })
-    }
-
-    /// Short of the wanted preload by no more than this, it is reached, N.
-    pub const fn reached_within(&self) -> Newtons {
-        self.reached_within
     }
 
     /// What to ask for.

@@ -90,17 +90,12 @@ fn digit(high: u32, next: u32, divisor: u32) -> u32 {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Divisor {
     /// m, from 2^30 to 2^31.
-    factor: i32,
+    pub(super) factor: i32,
     /// Places to the right, 16 to 46.
-    shift: u32,
+    pub(super) shift: u32,
 }
 
 impl Divisor {
-    /// From the bits of m and the shift.
-    pub(super) const fn from_parts(factor: i32, shift: u32) -> Self {
-        Self { factor, shift }
-    }
-
     /// `x` over this number.
     pub fn divide(&self, x: Q16) -> Q16 {
         let product = i64::from(x.to_bits()) * i64::from(self.factor);

@@ -79,15 +79,12 @@ impl<const N: usize> Table<N> {
 
     /// Value at `x`; that of the nearer end outside.
     pub fn eval(&self, x: Q16) -> Q16 {
-        Q16::from_bits(self.eval_bits(x.to_bits()))
-    }
-
-    fn eval_bits(&self, x: i32) -> i32 {
+        let x = x.to_bits();
         if x <= self.lo {
-            return self.samples.first().copied().unwrap_or(0);
+            return Q16::from_bits(self.samples.first().copied().unwrap_or(0));
         }
         if x >= self.hi {
-            return self.samples.last().copied().unwrap_or(0);
+            return Q16::from_bits(self.samples.last().copied().unwrap_or(0));
         }
         let offset = x.wrapping_sub(self.lo) as u32;
         let position = u64::from(offset) * u64::from(self.factor);
@@ -96,8 +93,7 @@ impl<const N: usize> Table<N> {
         let [value, linear, square, cube] = self.cubic(index);
         let product = |a: i64| (a * t + (1 << (FRACTION - 1))) >> FRACTION;
         let slope = linear + product(square + product(cube));
-        let bits = value + ((slope * t + (1 << FRACTION)) >> (FRACTION + 1));
-        bits.clamp(i32::MIN as i64, i32::MAX as i64) as i32
+        Q16::saturating_from_bits(value + ((slope * t + (1 << FRACTION)) >> (FRACTION + 1)))
     }
 
     /// Value, and twice the coefficients of t, t^2, t^3, of an interval.

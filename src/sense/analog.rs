@@ -41,7 +41,7 @@ pub struct AnalogChannel {
     low: u16,
     high: u16,
     /// Largest zero correction, units.
-    zero_limit: Q16,
+    pub(super) zero_limit: Q16,
     filter: LowPass,
 }
 
@@ -50,8 +50,8 @@ pub struct AnalogChannel {
 pub struct AnalogState {
     /// Before the offset.
     uncorrected: LastGood,
-    offset: Q16,
-    zeroing: Zeroing,
+    pub(super) offset: Q16,
+    pub(super) zeroing: Zeroing,
 }
 
 /// Progress of taking the zero.
@@ -91,11 +91,6 @@ impl AnalogChannel {
             zero_limit: crate::numeric::checked(key, ZERO_LIMIT * full_scale)?,
             filter: LowPass::build(tau_s),
         })
-    }
-
-    /// Largest zero correction, units.
-    pub const fn zero_limit(&self) -> Q16 {
-        self.zero_limit
     }
 
     /// One tick with the latest sample, new or not; `limit` is the largest age, ticks.
@@ -144,24 +139,9 @@ impl AnalogChannel {
 }
 
 impl AnalogState {
-    /// A start with this offset.
-    pub fn with(offset: Q16) -> Self {
-        Self { offset, ..Self::default() }
-    }
-
-    /// The offset that applies.
-    pub const fn offset(&self) -> Q16 {
-        self.offset
-    }
-
     /// Starts averaging the zero from the next good code on.
     pub fn begin_zero(&mut self) {
         self.zeroing = Zeroing::Running { sum: 0, count: 0 };
-    }
-
-    /// How far taking the zero has come.
-    pub const fn zeroing(&self) -> Zeroing {
-        self.zeroing
     }
 }
 
@@ -237,11 +217,11 @@ mod tests {
         state.begin_zero();
         // A zero 3 N up, with 0.2 N of noise that averages out.
         for now in 0..ZERO_SAMPLES {
-            assert!(matches!(state.zeroing(), Zeroing::Running { .. }));
+            assert!(matches!(state.zeroing, Zeroing::Running { .. }));
             let noise = if now % 2 == 0 { 0.2 } else { -0.2 };
             channel.step(&mut state, now, sample(code_of(3.0 + noise, 200.0), now), LIMIT);
         }
-        assert_eq!(state.zeroing(), Zeroing::Done);
+        assert_eq!(state.zeroing, Zeroing::Done);
         assert!((state.offset.to_num::<f64>() - 3.0).abs() < 0.002);
         for now in 300..400 {
             channel.step(&mut state, now, sample(code_of(36.3, 200.0), now), LIMIT);
@@ -259,7 +239,7 @@ mod tests {
         for now in 0..ZERO_SAMPLES {
             channel.step(&mut state, now, sample(code_of(6.1, 200.0), now), LIMIT);
         }
-        assert!(state.zeroing() == Zeroing::Rejected);
+        assert!(state.zeroing == Zeroing::Rejected);
         assert_eq!(state.offset, Q16::from_num(1));
     }
 
@@ -275,7 +255,7 @@ mod tests {
         for now in 1000..2000 {
             channel.step(&mut state, now, sample(0, now), LIMIT);
         }
-        assert!(matches!(state.zeroing(), Zeroing::Running { count: 1, .. }));
+        assert!(matches!(state.zeroing, Zeroing::Running { count: 1, .. }));
     }
 
     #[test]

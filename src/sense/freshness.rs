@@ -25,7 +25,7 @@ impl<T> Reading<T> {
 
     /// Whether the value may be acted on.
     pub fn is_usable(&self) -> bool {
-        self.validity.is_usable()
+        matches!(self.validity, Validity::Valid | Validity::Held(_))
     }
 }
 
@@ -43,13 +43,6 @@ pub enum Validity {
     Stale,
     /// Codes arrive, but no good one for longer than the limit.
     Invalid(Reason),
-}
-
-impl Validity {
-    /// Whether the value may be acted on.
-    pub const fn is_usable(self) -> bool {
-        matches!(self, Self::Valid | Self::Held(_))
-    }
 }
 
 /// What is wrong with a code.
@@ -77,8 +70,10 @@ pub const fn age(now: Tick, at: Tick) -> u32 {
 /// History of one sensor's codes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Freshness {
-    newest: Option<Tick>,
-    good: Option<Tick>,
+    /// Time of the last code, good or bad.
+    pub(super) newest: Option<Tick>,
+    /// Time of the last good code.
+    pub(super) good: Option<Tick>,
     fault: Option<Reason>,
 }
 
@@ -99,16 +94,6 @@ impl Freshness {
         if self.fault.is_none() {
             self.good = self.newest;
         }
-    }
-
-    /// Time of the last code, good or bad.
-    pub const fn newest(&self) -> Option<Tick> {
-        self.newest
-    }
-
-    /// Time of the last good code.
-    pub const fn good(&self) -> Option<Tick> {
-        self.good
     }
 
     /// `value` as a reading at `now`, with `limit` as the largest age, ticks.
@@ -169,7 +154,7 @@ impl LastGood {
         let filtered = match &mut self.filter {
             Some(filter) => low_pass.step(filter, self.value),
             none => {
-                *none = self.freshness.good().map(|_| LowPassState::at(self.value));
+                *none = self.freshness.good.map(|_| LowPassState::at(self.value));
                 self.value
             }
         };

@@ -116,7 +116,7 @@ impl Senses {
                 rig.sense.tread_full_scale_mm,
                 tuning.tread_tau_s,
             )?,
-            arm_angle: AngleSensor::build(rig.sense.angle_zero_code, arm.reach(), tuning.arm_tau_s),
+            arm_angle: AngleSensor::build(rig.sense.angle_zero_code, arm.reach, tuning.arm_tau_s),
             arm,
             limit: libm::round(rig.sense.stale_after_s * f64::from(TICK_HZ)) as u32,
         })
@@ -124,7 +124,7 @@ impl Senses {
 
     /// Largest zero correction of the preload sensor, N.
     pub const fn preload_zero_limit(&self) -> Newtons {
-        self.preload_sensor.zero_limit()
+        self.preload_sensor.zero_limit
     }
 
     /// One tick: `frame` holds the latest codes, new or not; `acceleration` is that of the speed
@@ -202,19 +202,16 @@ pub struct Zeros {
 impl SensesState {
     /// A start with these zeros.
     pub fn with(zeros: Zeros) -> Self {
-        Self {
-            preload_sensor: AnalogState::with(zeros.preload),
-            compression_sensor: AnalogState::with(zeros.compression),
-            ..Self::default()
-        }
+        let mut state = Self::default();
+        state.preload_sensor.offset = zeros.preload;
+        state.compression_sensor.offset = zeros.compression;
+        state
     }
 
     /// The zeros that apply.
     pub const fn zeros(&self) -> Zeros {
-        Zeros {
-            preload: self.preload_sensor.offset(),
-            compression: self.compression_sensor.offset(),
-        }
+        let (preload, compression) = (self.preload_sensor.offset, self.compression_sensor.offset);
+        Zeros { preload, compression }
     }
 
     /// Starts taking the zero of preload and compression sensor.
@@ -225,7 +222,7 @@ impl SensesState {
 
     /// Result of taking both zeros: none while in progress, then whether both were accepted.
     pub const fn zeroed(&self) -> Option<bool> {
-        match (self.preload_sensor.zeroing(), self.compression_sensor.zeroing()) {
+        match (self.preload_sensor.zeroing, self.compression_sensor.zeroing) {
             (Zeroing::Done, Zeroing::Done) => Some(true),
             (Zeroing::Running { .. } | Zeroing::Off, _)
             | (_, Zeroing::Running { .. } | Zeroing::Off) => None,

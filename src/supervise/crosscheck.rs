@@ -81,7 +81,7 @@ pub(super) struct CrossCheck {
     /// See [`START_LAG_MM`], mm.
     start_lag: Millimetres,
     /// See [`SHORT_LATENCIES`] and [`STRAYED`], N.
-    short: Newtons,
+    pub(super) short: Newtons,
     strayed: Newtons,
 }
 
@@ -242,11 +242,6 @@ impl CrossCheck {
         unsound
             .then_some(Fault::PreloadSensorImplausible)
             .or(strayed.then_some(Fault::PretightenerRunaway))
-    }
-
-    /// Deviation by which a preload is short, N.
-    pub(super) const fn short(&self) -> Newtons {
-        self.short
     }
 
     /// Change of the preload that no sensor sleeps through, N: half of what counts as astray.

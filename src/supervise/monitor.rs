@@ -90,7 +90,7 @@ impl Monitor {
                 "preload.limit_n",
                 rig.preload.limit_n * (1.0 + OVERPRESSURE_PART),
             )?,
-            short: cross.short(),
+            short: cross.short,
             short_ticks: (answer_s(rig) * f64::from(TICK_HZ)) as u16,
             spring: checked("preload.spring_n_per_mm", rig.preload.spring_n_per_mm)?,
             answers: LowPass::build(answer_s(rig)),

@@ -2,6 +2,7 @@
 
 use super::{Controller, State, TickContext};
 use crate::control::schedule::{Course, Targets};
+use crate::control::speed_loop::SpeedLoopState;
 use crate::numeric::{between, divide};
 use crate::supervise::{Mode, Trigger};
 use crate::units::{
@@ -35,7 +36,7 @@ impl Controller {
             reference: state.preload_loop.reference(tick.sensed.preload.value),
             preload: estimate.remembered_preload(),
             preload_late: state.preload_loop.due() - tick.sensed.preload_filtered
-                > self.schedule.reached_within(),
+                > self.schedule.reached_within,
         }
     }
 
@@ -104,7 +105,7 @@ impl Controller {
         }
         self.learn_slip(state, tick);
         let missing = plan.most_preload - tick.sensed.preload_filtered;
-        let waits = missing > self.schedule.reached_within() && direction == Direction::Deploy;
+        let waits = missing > self.schedule.reached_within && direction == Direction::Deploy;
         if slipping || slipped && waits {
             targets.speed = targets.speed.min(self.least_speed);
         }
@@ -174,7 +175,7 @@ impl Controller {
             }
             Mode::Preload(_) => {
                 state.profile.halt();
-                state.speed_loop.reset();
+                state.speed_loop = SpeedLoopState::default();
                 return (MotorCommand::OFF, self.regulate(state, tick, targets, Q16::ZERO));
             }
             _ => {

@@ -111,7 +111,7 @@ impl Controller {
         let reached = state.planning.plan.as_ref().is_some_and(|plan| {
             let course = self.course(state, tick, direction);
             let targets = self.schedule.targets(self.estimator.steps(), plan, &course);
-            let enough = targets.preload - self.schedule.reached_within();
+            let enough = targets.preload - self.schedule.reached_within;
             tick.sensed.preload_filtered >= enough.min(plan.rolling_preload)
         });
         state.condition_ticks = if reached { state.condition_ticks + 1 } else { 0 };

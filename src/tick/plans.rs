@@ -107,7 +107,7 @@ impl Controller {
         waiting: bool,
     ) {
         let missing = cross_preload - tick.sensed.preload_filtered;
-        let reached = missing <= self.schedule.reached_within();
+        let reached = missing <= self.schedule.reached_within;
         let approach = &mut state.approach;
         let since = approach.standing_since.unwrap_or(tick.now);
         approach.standing_since = reached.then_some(since);

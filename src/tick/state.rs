@@ -168,7 +168,7 @@ impl State {
     /// Stops loops and profile where they are.
     pub(super) fn halt(&mut self) {
         self.profile.halt();
-        self.speed_loop.reset();
+        self.speed_loop = SpeedLoopState::default();
         self.preload_loop.halt();
     }
 }
