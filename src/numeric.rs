@@ -6,17 +6,15 @@ mod build;
 mod divide;
 mod high;
 mod low_pass;
-mod quotient;
 mod roots;
 mod sine;
 mod table;
 
 pub use build::{checked, cosine_of_turns};
-pub use divide::{Divisor, divide, part};
+pub use divide::{Divisor, divide, part, reciprocal_of_normalised};
 pub use high::high;
 pub(crate) use high::horner;
 pub use low_pass::{LowPass, LowPassState};
-pub use quotient::reciprocal_of_normalised;
 pub use roots::sqrt;
 pub use sine::sin_cos;
 pub use table::Table;

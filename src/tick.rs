@@ -184,13 +184,11 @@ impl Controller {
         let targets = self.targets(state, tick);
         self.transit(state, tick);
         let (drive, preload) = self.actuate(state, tick, &targets);
+        (tick.output.drive, tick.output.preload) = (drive, preload);
+        state.monitor.set_duties(drive.duty, preload.duty);
         self.note_stage(state, tick);
         self.follow_vibration(state, tick);
-        tick.output.drive = drive;
-        tick.output.preload = preload;
         tick.output.telemetry = self.telemetry(state, tick, &targets);
-        let row = &tick.output.telemetry;
-        state.monitor.set_duties(row.drive, row.pretightener);
     }
 
     fn look_for_faults(&self, state: &mut State, tick: &mut TickContext<'_>, input: &Input) {
@@ -235,19 +233,16 @@ impl Controller {
         if !state.mode.moves() {
             return;
         }
-        let standing_since = state.approach.standing_since;
-        let pressed = tick.pressed();
-        let limited_by = state.planning.plan.as_ref().map(|plan| plan.limited_by);
-        let most = state.planning.plan.as_ref().map_or(Q16::MAX, |plan| plan.most_preload);
-        let short = most - tick.sensed.preload_filtered;
+        let plan = state.planning.plan.as_ref();
+        let most = plan.map_or(Q16::MAX, |plan| plan.most_preload);
         let follow = Follow {
             now: tick.now,
             sensed: tick.sensed,
-            pressed,
+            pressed: tick.pressed(),
             duty: state.speed_loop.duty(),
-            most_pressed: short <= self.schedule.reached_within(),
-            standing_since,
-            limited_by,
+            most_pressed: most - tick.sensed.preload_filtered <= self.schedule.reached_within,
+            standing_since: state.approach.standing_since,
+            limited_by: plan.map(|plan| plan.limited_by),
         };
         let found = self.estimator.follow(&mut state.estimate, &follow);
         self.take_findings(state, tick, found);

@@ -9,6 +9,8 @@
 
 #![deny(clippy::float_arithmetic)]
 
+use heapless::Deque;
+
 use crate::model::timing::SLEW_PART;
 use crate::numeric::{LowPass, LowPassState, between, checked};
 use crate::rig::{Rig, RigError};
@@ -52,27 +54,14 @@ pub struct PreloadLoop {
 }
 
 /// Reference and model.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct PreloadLoopState {
     /// Reference after the slew limit, N.
     reference: Newtons,
-    /// References inside the dead time.
-    pipeline: [Newtons; LONGEST_DELAY],
-    head: usize,
+    /// References inside the dead time, the oldest first.
+    pipeline: Deque<Newtons, LONGEST_DELAY>,
     model: LowPassState,
     running: bool,
-}
-
-impl Default for PreloadLoopState {
-    fn default() -> Self {
-        Self {
-            reference: Q16::ZERO,
-            pipeline: [Q16::ZERO; LONGEST_DELAY],
-            head: 0,
-            model: LowPassState::default(),
-            running: false,
-        }
-    }
 }
 
 impl PreloadLoop {
@@ -104,7 +93,7 @@ impl PreloadLoop {
         drift: NewtonsPerSecond,
     ) -> Duty {
         if !state.running {
-            state.start(measured);
+            state.start(measured, self.delay);
         }
         let change = between(target - state.reference, -self.step, self.step);
         // An actuator that does not keep up is waited for, but not without end.
@@ -114,7 +103,9 @@ impl PreloadLoop {
         let beyond = rate - between(rate, -self.slew, self.slew);
         let change = if falls_back { change * WAITING_PART } else { change };
         state.reference += change - Q16::narrow(per_tick(beyond));
-        let delayed = state.exchange(self.delay);
+        // The dead time is shorter than the pipeline: there is room.
+        let _ = state.pipeline.push_back(state.reference);
+        let delayed = state.pipeline.pop_front().unwrap_or(state.reference);
         let expected = self.lag.step(&mut state.model, delayed);
         let correction = between(
             (expected - measured) * self.correction,
@@ -154,21 +145,14 @@ impl PreloadLoopState {
         if self.running { self.model.output() } else { Q16::ZERO }
     }
 
-    fn start(&mut self, measured: Newtons) {
+    fn start(&mut self, measured: Newtons, delay: usize) {
         self.reference = measured;
-        self.pipeline = [measured; LONGEST_DELAY];
+        self.pipeline.clear();
+        for _ in 0..delay.min(LONGEST_DELAY - 1) {
+            let _ = self.pipeline.push_back(measured);
+        }
         self.model = LowPassState::at(measured);
         self.running = true;
-    }
-
-    /// Puts the reference in and takes out the one of `delay` ticks ago.
-    fn exchange(&mut self, delay: usize) -> Newtons {
-        self.head = (self.head + 1) % LONGEST_DELAY;
-        if let Some(slot) = self.pipeline.get_mut(self.head) {
-            *slot = self.reference;
-        }
-        let past = (self.head + LONGEST_DELAY - delay) % LONGEST_DELAY;
-        self.pipeline.get(past).copied().unwrap_or(self.reference)
     }
 }
 

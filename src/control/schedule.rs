@@ -26,7 +26,7 @@ const END_LATE: Millimetres = q16(30_000);
 pub struct Schedule {
     timing: Timing,
     /// Short of the wanted preload by no more than this, it is reached, N.
-    reached_within: Newtons,
+    pub(crate) reached_within: Newtons,
 }
 
 /// Where the wheel is on its run.
@@ -59,7 +59,7 @@ pub struct Course {
 }
 
 /// What is asked for.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Targets {
     /// Speed along the run, mm/s.
     pub speed: MillimetresPerSecond,
@@ -85,25 +85,17 @@ impl Schedule {
         })
     }
 
-    /// Short of the wanted preload by no more than this, it is reached, N.
-    pub const fn reached_within(&self) -> Newtons {
-        self.reached_within
-    }
-
     /// What to ask for.
     pub fn targets(&self, steps: &Steps, plan: &Plan, course: &Course) -> Targets {
-        let within =
-            |from: Option<Millimetres>, distance| from.is_some_and(|from| from <= distance);
         let sight = self.sight(plan, course);
         // To where the corner is felt, by the table or the corner itself.
         let ahead = course.distance.map(|distance| distance - plan.approach.brake_from);
         let earliest = if course.felt { ahead } else { ahead.map(|at| at - steps.tolerance()) };
         let ramping = course.ramping
             || course.critical
-            || within(
-                earliest,
-                self.ramp_distance(plan, course.reference.min(plan.cruise_preload)),
-            );
+            || earliest.is_some_and(|at| {
+                at <= self.ramp_distance(plan, course.reference.min(plan.cruise_preload))
+            });
         let preload = if ramping { plan.ramp_preload } else { plan.cruise_preload };
         // Without look-ahead the preload between the steps is the one to have there.
         let due = if plan.look_ahead { plan.cross_preload } else { plan.cruise_preload };
@@ -370,9 +362,7 @@ mod tests {
             let wanted = if remaining < least { Q16::ZERO } else { plan.cruise_speed };
             prop_assert_eq!(got, wanted);
         }
-    }
 
-    proptest! {
         #[test]
         fn out_of_sight_no_braking_is_due(
             back in any::<bool>(),

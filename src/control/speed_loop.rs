@@ -99,11 +99,6 @@ impl SpeedLoop {
 }
 
 impl SpeedLoopState {
-    /// Forgets the integral part.
-    pub fn reset(&mut self) {
-        *self = Self::default();
-    }
-
     /// Duty of the last tick.
     pub const fn duty(&self) -> Ratio {
         self.duty

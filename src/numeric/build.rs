@@ -59,8 +59,8 @@ impl Divisor {
         }
         // 1/d = part 2^exponent with a part of at least a half.
         let (part, exponent) = libm::frexp(1.0 / value);
-        let factor = libm::round(libm::ldexp(part, 31)).min(2_147_483_647.0);
-        Ok(Self::from_parts(factor as i32, (31 - exponent) as u32))
+        let factor = libm::round(libm::ldexp(part, 31)).min(2_147_483_647.0) as i32;
+        Ok(Self { factor, shift: (31 - exponent) as u32 })
     }
 }
 

@@ -70,28 +70,21 @@ impl<const N: usize> Table<N> {
             shift += 1;
         }
         let table = Self { lo, hi, factor, shift, samples };
-        let mut index = 0;
-        while index < N - 1 {
-            let [_, linear, square, cube] = table.cubic(index);
-            if !(within(linear) && within(square) && within(cube)) {
-                return None;
-            }
-            index += 1;
-        }
-        Some(table)
+        let tame = (0..N - 1).all(|index| {
+            let [_, coefficients @ ..] = table.cubic(index);
+            coefficients.iter().all(|coefficient| coefficient.abs() < COEFFICIENT_LIMIT)
+        });
+        tame.then_some(table)
     }
 
     /// Value at `x`; that of the nearer end outside.
     pub fn eval(&self, x: Q16) -> Q16 {
-        Q16::from_bits(self.eval_bits(x.to_bits()))
-    }
-
-    fn eval_bits(&self, x: i32) -> i32 {
+        let x = x.to_bits();
         if x <= self.lo {
-            return self.samples.first().copied().unwrap_or(0);
+            return Q16::from_bits(self.samples.first().copied().unwrap_or(0));
         }
         if x >= self.hi {
-            return self.samples.last().copied().unwrap_or(0);
+            return Q16::from_bits(self.samples.last().copied().unwrap_or(0));
         }
         let offset = x.wrapping_sub(self.lo) as u32;
         let position = u64::from(offset) * u64::from(self.factor);
@@ -100,8 +93,7 @@ impl<const N: usize> Table<N> {
         let [value, linear, square, cube] = self.cubic(index);
         let product = |a: i64| (a * t + (1 << (FRACTION - 1))) >> FRACTION;
         let slope = linear + product(square + product(cube));
-        let bits = value + ((slope * t + (1 << FRACTION)) >> (FRACTION + 1));
-        bits.clamp(i32::MIN as i64, i32::MAX as i64) as i32
+        Q16::saturating_from_bits(value + ((slope * t + (1 << FRACTION)) >> (FRACTION + 1)))
     }
 
     /// Value, and twice the coefficients of t, t^2, t^3, of an interval.
@@ -122,10 +114,6 @@ impl<const N: usize> Table<N> {
         // The index is below N by construction; the check spares a panic.
         if index < N { self.samples[index] as i64 } else { self.samples[N - 1] as i64 }
     }
-}
-
-fn within(coefficient: i64) -> bool {
-    coefficient > -COEFFICIENT_LIMIT && coefficient < COEFFICIENT_LIMIT
 }
 
 #[cfg(test)]

@@ -47,12 +47,10 @@ impl Rig {
     /// Whether sensors, pre-tightener and drive can do what the controller asks of them.
     pub(super) fn abilities(&self) -> Result<(), RigError> {
         let (preload, drive) = (&self.preload, &self.drive);
-        let radius = self.rig.wheel_radius_mm;
-        let turn_mm = 2.0 * core::f64::consts::PI * radius;
+        let turn_mm = 2.0 * core::f64::consts::PI * self.rig.wheel_radius_mm;
         // A corner pressed by the limit into a relaxed tread: a triangle on each side of it, at the
         // slope of a wheel that touches it, carries `k L d^2 / tan(phi)`.
-        let below = radius - self.rig.step_height_mm;
-        let slope = libm::sqrt(radius * radius - below * below) / below;
+        let slope = self.corner_reach_mm() / (self.rig.wheel_radius_mm - self.rig.step_height_mm);
         let rate = 1e-9 * self.tread.k_inf_pa_per_m * self.rig.wheel_width_mm;
         let deepest = libm::sqrt(preload.limit_n * slope / rate);
         let load = self.plant.top_load_n * self.plant.top_load_share;

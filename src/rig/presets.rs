@@ -1,11 +1,6 @@
 //! The two rigs of the study.
 
-use super::{ControlSettings, Drive, Geometry, List, Loads, Pretightener, Rig, Sensors, Tread};
-
-/// A list from a slice, which must fit.
-fn list<const N: usize>(values: &[f64]) -> List<N> {
-    List::from_slice(values).unwrap_or_default()
-}
+use super::{ControlSettings, Drive, Geometry, Loads, Pretightener, Rig, Sensors, Tread};
 
 impl Rig {
     /// The 1:1 prototype: one drive unit at a third of the study's loads.
@@ -16,7 +11,7 @@ impl Rig {
                 wheel_wear_mm: 0.05,
                 wheel_width_mm: 28.0,
                 step_height_mm: 4.0,
-                step_positions_mm: list(&[18.0, 40.0, 62.0]),
+                step_positions_mm: [18.0, 40.0, 62.0].into(),
                 step_tolerance_mm: 0.8,
                 travel_mm: 80.0,
                 wall_radius_mm: 150.0,
@@ -50,7 +45,7 @@ impl Rig {
                 acceleration_mm_s2: 250.0,
                 jerk_mm_s3: 5000.0,
                 ripple_pitch_mm: 0.1309,
-                modes_hz: list(&[163.0, 276.0]),
+                modes_hz: [163.0, 276.0].into(),
                 guard_band: 0.08,
             },
             sense: Sensors {

@@ -278,20 +278,11 @@ impl Rig {
     }
 
     fn ranges(&self) -> Result<(), RigError> {
-        for (key, value, min, max) in self.bounds() {
-            // Written so that a NaN fails.
-            if !(value >= min && value <= max) {
+        let modes = self.drive.modes_hz.iter().map(|mode| ("drive.modes_hz", *mode, 0.1, 10_000.0));
+        for (key, value, min, max) in self.bounds().into_iter().chain(modes) {
+            // A NaN is in no range.
+            if !(min..=max).contains(&value) {
                 return Err(RigError::OutOfRange { key, value, min, max });
-            }
-        }
-        for &mode in &self.drive.modes_hz {
-            if !(0.1..=10_000.0).contains(&mode) {
-                return Err(RigError::OutOfRange {
-                    key: "drive.modes_hz",
-                    value: mode,
-                    min: 0.1,
-                    max: 10_000.0,
-                });
             }
         }
         Ok(())
@@ -300,29 +291,21 @@ impl Rig {
     /// Steps ascend, with the contact run of a wheel between them and before
     /// the first, and lie inside the travel.
     fn step_table(&self) -> Result<(), RigError> {
-        let radius = self.rig.wheel_radius_mm;
-        let below = radius - self.rig.step_height_mm;
-        if below <= 0.0 {
-            return Err(RigError::OutOfRange {
-                key: "rig.step_height_mm",
-                value: self.rig.step_height_mm,
-                min: 0.5,
-                max: radius,
-            });
+        let (value, max) = (self.rig.step_height_mm, self.rig.wheel_radius_mm);
+        if max - value <= 0.0 {
+            return Err(RigError::OutOfRange { key: "rig.step_height_mm", value, min: 0.5, max });
         }
-        let run = libm::sqrt(radius * radius - below * below);
-        let mut least = run + 2.0 * self.rig.step_tolerance_mm;
-        for (index, &position) in self.rig.step_positions_mm.iter().enumerate() {
-            let (step, position_mm) = (index + 1, position);
-            let travel_mm = self.rig.travel_mm;
-            if position > travel_mm {
+        let (run, travel_mm) = (self.corner_reach_mm(), self.rig.travel_mm);
+        let mut least_mm = run + 2.0 * self.rig.step_tolerance_mm;
+        for (step, &position_mm) in (1..).zip(&self.rig.step_positions_mm) {
+            if position_mm > travel_mm {
                 return Err(RigError::StepBeyondTravel { step, position_mm, travel_mm });
             }
             // A NaN fails.
-            if position < least || position.is_nan() {
-                return Err(RigError::StepOrder { step, position_mm, least_mm: least });
+            if position_mm < least_mm || position_mm.is_nan() {
+                return Err(RigError::StepOrder { step, position_mm, least_mm });
             }
-            least = position + run + 2.0 * self.rig.step_tolerance_mm;
+            least_mm = position_mm + run + 2.0 * self.rig.step_tolerance_mm;
         }
         Ok(())
     }
@@ -332,7 +315,7 @@ impl Rig {
         let max_mm = self.rig.arm_pivot_radius_mm + 0.9 * self.rig.arm_length_mm;
         for level in [0, self.rig.step_positions_mm.len()] {
             let radius_mm = self.centre_radius_mm(level);
-            if !(radius_mm >= min_mm && radius_mm <= max_mm) {
+            if !(min_mm..=max_mm).contains(&radius_mm) {
                 return Err(RigError::OutOfReach { radius_mm, min_mm, max_mm });
             }
         }

@@ -2,9 +2,9 @@
 
 #![deny(clippy::float_arithmetic)]
 
-use super::freshness::{Freshness, Reading, Reason};
+use super::freshness::{Filtered, LastGood, Reason};
 use super::raw::{AdcCode, Sample};
-use crate::numeric::{LowPass, LowPassState};
+use crate::numeric::LowPass;
 use crate::rig::RigError;
 use crate::units::{Q16, Tick};
 
@@ -41,29 +41,17 @@ pub struct AnalogChannel {
     low: u16,
     high: u16,
     /// Largest zero correction, units.
-    zero_limit: Q16,
+    pub(super) zero_limit: Q16,
     filter: LowPass,
 }
 
 /// State of an [`AnalogChannel`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct AnalogState {
-    freshness: Freshness,
-    /// Last good value before the offset.
-    uncorrected: Q16,
-    offset: Q16,
-    /// Filter of the uncorrected value; none before the first.
-    filter: Option<LowPassState>,
-    zeroing: Zeroing,
-}
-
-/// What an [`AnalogChannel`] gives.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct AnalogOutput {
-    /// The newest good value.
-    pub reading: Reading<Q16>,
-    /// The same through the low-pass.
-    pub filtered: Q16,
+    /// Before the offset.
+    uncorrected: LastGood,
+    pub(super) offset: Q16,
+    pub(super) zeroing: Zeroing,
 }
 
 /// Progress of taking the zero.
@@ -105,11 +93,6 @@ impl AnalogChannel {
         })
     }
 
-    /// Largest zero correction, units.
-    pub const fn zero_limit(&self) -> Q16 {
-        self.zero_limit
-    }
-
     /// One tick with the latest sample, new or not; `limit` is the largest age, ticks.
     pub fn step(
         &self,
@@ -117,45 +100,29 @@ impl AnalogChannel {
         now: Tick,
         sample: Option<Sample<AdcCode>>,
         limit: u32,
-    ) -> AnalogOutput {
-        if let Some(sample) = state.freshness.take(sample) {
-            let code = sample.code.get();
-            if (self.low..=self.high).contains(&code) {
-                state.freshness.judge(Ok(()));
-                state.uncorrected = self.value(code);
-                self.accumulate(state);
-            } else {
-                state.freshness.judge(Err(Reason::OutOfRange));
-            }
+    ) -> Filtered {
+        if state.uncorrected.take(sample, |code| self.value(code.get())) {
+            self.accumulate(state);
         }
-        // The filter runs on the held value in every tick, whatever the jitter of the samples.
-        let filtered = match &mut state.filter {
-            Some(filter) => self.filter.step(filter, state.uncorrected),
-            none => {
-                *none = state.freshness.good().map(|_| LowPassState::at(state.uncorrected));
-                state.uncorrected
-            }
-        };
-        let value = state.uncorrected - state.offset;
-        AnalogOutput {
-            reading: state.freshness.reading(value, now, limit),
-            filtered: filtered - state.offset,
-        }
+        state.uncorrected.step(&self.filter, state.offset, now, limit)
     }
 
-    /// A good code in units, before the offset.
-    fn value(&self, code: u16) -> Q16 {
+    /// The code of an intact bridge in units, before the offset.
+    fn value(&self, code: u16) -> Result<Q16, Reason> {
+        if !(self.low..=self.high).contains(&code) {
+            return Err(Reason::OutOfRange);
+        }
         let above = i64::from((i32::from(code) << 8) - self.zero);
         // Q8 x Q32 = Q40 to Q16, rounded.
         let bits = (above * i64::from(self.gain) + (1 << 23)) >> 24;
-        Q16::saturating_from_bits(bits)
+        Ok(Q16::saturating_from_bits(bits))
     }
 
     fn accumulate(&self, state: &mut AnalogState) {
         let Zeroing::Running { sum, count } = &mut state.zeroing else {
             return;
         };
-        *sum += i64::from(state.uncorrected.to_bits());
+        *sum += i64::from(state.uncorrected.value.to_bits());
         *count += 1;
         if *count < ZERO_SAMPLES {
             return;
@@ -172,24 +139,9 @@ impl AnalogChannel {
 }
 
 impl AnalogState {
-    /// A start with this offset.
-    pub fn with(offset: Q16) -> Self {
-        Self { offset, ..Self::default() }
-    }
-
-    /// The offset that applies.
-    pub const fn offset(&self) -> Q16 {
-        self.offset
-    }
-
     /// Starts averaging the zero from the next good code on.
     pub fn begin_zero(&mut self) {
         self.zeroing = Zeroing::Running { sum: 0, count: 0 };
-    }
-
-    /// How far taking the zero has come.
-    pub const fn zeroing(&self) -> Zeroing {
-        self.zeroing
     }
 }
 
@@ -265,11 +217,11 @@ mod tests {
         state.begin_zero();
         // A zero 3 N up, with 0.2 N of noise that averages out.
         for now in 0..ZERO_SAMPLES {
-            assert!(matches!(state.zeroing(), Zeroing::Running { .. }));
+            assert!(matches!(state.zeroing, Zeroing::Running { .. }));
             let noise = if now % 2 == 0 { 0.2 } else { -0.2 };
             channel.step(&mut state, now, sample(code_of(3.0 + noise, 200.0), now), LIMIT);
         }
-        assert_eq!(state.zeroing(), Zeroing::Done);
+        assert_eq!(state.zeroing, Zeroing::Done);
         assert!((state.offset.to_num::<f64>() - 3.0).abs() < 0.002);
         for now in 300..400 {
             channel.step(&mut state, now, sample(code_of(36.3, 200.0), now), LIMIT);
@@ -287,7 +239,7 @@ mod tests {
         for now in 0..ZERO_SAMPLES {
             channel.step(&mut state, now, sample(code_of(6.1, 200.0), now), LIMIT);
         }
-        assert!(state.zeroing() == Zeroing::Rejected);
+        assert!(state.zeroing == Zeroing::Rejected);
         assert_eq!(state.offset, Q16::from_num(1));
     }
 
@@ -303,7 +255,7 @@ mod tests {
         for now in 1000..2000 {
             channel.step(&mut state, now, sample(0, now), LIMIT);
         }
-        assert!(matches!(state.zeroing(), Zeroing::Running { count: 1, .. }));
+        assert!(matches!(state.zeroing, Zeroing::Running { count: 1, .. }));
     }
 
     #[test]
@@ -337,9 +289,9 @@ mod tests {
         for sound in [0.1, 1.0, 20_000.0] {
             assert!(AnalogChannel::try_build("k", sound, 0.005).is_ok(), "{sound}");
         }
-        for (value, named) in [(0.0, 0.0), (-5.0, -5.0), (0.099, 0.099), (20_001.0, 20_001.0)] {
+        for value in [0.0, -5.0, 0.099, 20_001.0] {
             let refused = AnalogChannel::try_build("k", value, 0.005);
-            let error = RigError::OutOfRange { key: "k", value: named, min: 0.1, max: 20_000.0 };
+            let error = RigError::OutOfRange { key: "k", value, min: 0.1, max: 20_000.0 };
             assert_eq!(refused.err(), Some(error));
         }
         assert!(AnalogChannel::try_build("k", f64::NAN, 0.005).is_err());

@@ -2,9 +2,9 @@
 
 #![deny(clippy::float_arithmetic)]
 
-use super::freshness::{Freshness, Reading, Reason};
+use super::freshness::{Filtered, LastGood, Reason};
 use super::raw::{AngleFrame, Sample};
-use crate::numeric::{LowPass, LowPassState};
+use crate::numeric::LowPass;
 use crate::units::{Q16, Tick};
 
 /// Angle from the pillar in codes of the sensor, 16384 a turn, LSB 2^-16 code = 5.9 nrad;
@@ -68,56 +68,26 @@ pub struct AngleSensor {
     filter: LowPass,
 }
 
-/// State of an [`AngleSensor`].
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct AngleState {
-    freshness: Freshness,
-    angle: Codes,
-    filter: Option<LowPassState>,
-}
-
-/// What an [`AngleSensor`] gives.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Angle {
-    /// The newest good angle.
-    pub reading: Reading<Codes>,
-    /// The same through the low-pass.
-    pub filtered: Codes,
-}
-
 impl AngleSensor {
     /// A sensor reading `zero_code` with the arm along the pillar, for arms that
     /// move from `lo` to `hi`.
     #[allow(clippy::float_arithmetic, reason = "SI to machine units, once at start")]
-    pub fn build(zero_code: f64, lo: Codes, hi: Codes, tau_s: f64) -> Self {
+    pub fn build(zero_code: f64, (lo, hi): (Codes, Codes), tau_s: f64) -> Self {
         // Reduced to a turn by the cast's wrap from 64 bits.
         let zero = libm::round(zero_code * f64::from(1_u32 << 18)) as i64 as u32;
         Self { zero, lo, hi, filter: LowPass::build(tau_s) }
     }
 
     /// One tick with the latest sample, new or not; `limit` is the largest age, ticks.
-    pub fn step(
+    pub(super) fn step(
         &self,
-        state: &mut AngleState,
+        state: &mut LastGood,
         now: Tick,
         sample: Option<Sample<AngleFrame>>,
         limit: u32,
-    ) -> Angle {
-        if let Some(sample) = state.freshness.take(sample) {
-            let verdict = decode(sample.code).and_then(|code| self.within(code));
-            if let Ok(angle) = verdict {
-                state.angle = angle;
-            }
-            state.freshness.judge(verdict.map(|_| ()));
-        }
-        let filtered = match &mut state.filter {
-            Some(filter) => self.filter.step(filter, state.angle),
-            none => {
-                *none = state.freshness.good().map(|_| LowPassState::at(state.angle));
-                state.angle
-            }
-        };
-        Angle { reading: state.freshness.reading(state.angle, now, limit), filtered }
+    ) -> Filtered {
+        state.take(sample, |frame| self.within(decode(frame)?));
+        state.step(&self.filter, Codes::ZERO, now, limit)
     }
 
     /// A code as an angle within the arm's reach.
@@ -143,7 +113,7 @@ mod tests {
     }
 
     fn sensor(zero: f64) -> AngleSensor {
-        AngleSensor::build(zero, Codes::from_num(100), Codes::from_num(4000), 0.0)
+        AngleSensor::build(zero, (Codes::from_num(100), Codes::from_num(4000)), 0.0)
     }
 
     #[test]
@@ -165,7 +135,6 @@ mod tests {
 
     #[test]
     fn the_diagnostics_confirm_a_field_in_range_alone() {
-        let frame = |bits: u16| AngleFrame::new(bits | ((bits.count_ones() % 2) as u16) << 15);
         for (bits, expected) in [
             (0x0180, Ok(true)),
             (0x01FF, Ok(true)),
@@ -185,7 +154,7 @@ mod tests {
         for zero in [0.0, 2000.0, 2000.37, 15_000.0, 16_383.0] {
             let sensor = sensor(zero);
             for code in 0..16_384 {
-                let mut state = AngleState::default();
+                let mut state = LastGood::default();
                 let sample = Some(Sample { code: frame(code), at: 1 });
                 let angle = sensor.step(&mut state, 1, sample, LIMIT);
                 let exact = (f64::from(code) - zero + 8192.0).rem_euclid(16_384.0) - 8192.0;
@@ -202,7 +171,7 @@ mod tests {
     #[test]
     fn bad_frames_hold_the_angle() {
         let sensor = sensor(2000.0);
-        let mut state = AngleState::default();
+        let mut state = LastGood::default();
         sensor.step(&mut state, 0, Some(Sample { code: frame(3000), at: 0 }), LIMIT);
         let parity = AngleFrame::new(frame(3500).get() ^ 1);
         let flagged = AngleFrame::new(frame(3500).get() ^ 0xC000);

@@ -21,7 +21,7 @@ const LEVEL_SWITCH: Ratio = q16(600_000);
 #[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Arm {
     /// Least and largest plausible angle.
-    reach: (Codes, Codes),
+    pub(super) reach: (Codes, Codes),
     pivot: Millimetres,
     length: Millimetres,
     /// Wheel-centre radius on the outermost wall without compression.
@@ -44,11 +44,6 @@ impl Arm {
             outermost: checked("rig.wall_radius_mm", rig.centre_radius_mm(0))?,
             per_step: checked("rig.step_height_mm", 1.0 / geometry.step_height_mm)?,
         })
-    }
-
-    /// Least and largest angle that the arm can take.
-    pub const fn reach(&self) -> (Codes, Codes) {
-        self.reach
     }
 
     /// Radius of the wheel centre, mm, and tangent of the arm angle (radial force per axial
@@ -103,7 +98,7 @@ mod tests {
     #[test]
     fn radius_and_tangent_follow_the_geometry_over_the_whole_reach() {
         let arm = arm();
-        let (lo, hi) = arm.reach();
+        let (lo, hi) = arm.reach;
         let (mut worst_r, mut worst_t) = (0.0_f64, 0.0_f64);
         let mut angle = lo;
         while angle <= hi {

@@ -3,7 +3,8 @@
 #![deny(clippy::float_arithmetic)]
 
 use super::raw::Sample;
-use crate::units::Tick;
+use crate::numeric::{LowPass, LowPassState};
+use crate::units::{Q16, Tick};
 
 /// A value with its time and validity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -17,11 +18,6 @@ pub struct Reading<T> {
 }
 
 impl<T> Reading<T> {
-    /// Another quantity of the same time and validity.
-    pub fn with<U>(&self, value: U) -> Reading<U> {
-        Reading { value, at: self.at, validity: self.validity }
-    }
-
     /// Ticks since the value was taken.
     pub fn age(&self, now: Tick) -> u32 {
         age(now, self.at)
@@ -29,7 +25,7 @@ impl<T> Reading<T> {
 
     /// Whether the value may be acted on.
     pub fn is_usable(&self) -> bool {
-        self.validity.is_usable()
+        matches!(self.validity, Validity::Valid | Validity::Held(_))
     }
 }
 
@@ -47,13 +43,6 @@ pub enum Validity {
     Stale,
     /// Codes arrive, but no good one for longer than the limit.
     Invalid(Reason),
-}
-
-impl Validity {
-    /// Whether the value may be acted on.
-    pub const fn is_usable(self) -> bool {
-        matches!(self, Self::Valid | Self::Held(_))
-    }
 }
 
 /// What is wrong with a code.
@@ -81,8 +70,10 @@ pub const fn age(now: Tick, at: Tick) -> u32 {
 /// History of one sensor's codes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Freshness {
-    newest: Option<Tick>,
-    good: Option<Tick>,
+    /// Time of the last code, good or bad.
+    pub(super) newest: Option<Tick>,
+    /// Time of the last good code.
+    pub(super) good: Option<Tick>,
     fault: Option<Reason>,
 }
 
@@ -105,16 +96,6 @@ impl Freshness {
         }
     }
 
-    /// Time of the last code, good or bad.
-    pub const fn newest(&self) -> Option<Tick> {
-        self.newest
-    }
-
-    /// Time of the last good code.
-    pub const fn good(&self) -> Option<Tick> {
-        self.good
-    }
-
     /// `value` as a reading at `now`, with `limit` as the largest age, ticks.
     pub fn reading<T>(&self, value: T, now: Tick, limit: u32) -> Reading<T> {
         let young = |at: Tick| age(now, at) <= limit;
@@ -129,8 +110,62 @@ impl Freshness {
     }
 }
 
+/// A reading, and its value through a low-pass.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Filtered {
+    /// The newest good value.
+    pub reading: Reading<Q16>,
+    /// The same through the low-pass.
+    pub filtered: Q16,
+}
+
+/// A sensor's last good value and its low-pass.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct LastGood {
+    freshness: Freshness,
+    pub(super) value: Q16,
+    /// None before the first good value.
+    filter: Option<LowPassState>,
+}
+
+impl LastGood {
+    /// Takes a sample that is new; whether it is good.
+    pub(super) fn take<T>(
+        &mut self,
+        sample: Option<Sample<T>>,
+        decode: impl FnOnce(T) -> Result<Q16, Reason>,
+    ) -> bool {
+        let Some(sample) = self.freshness.take(sample) else { return false };
+        let verdict = decode(sample.code);
+        self.value = verdict.unwrap_or(self.value);
+        self.freshness.judge(verdict.map(|_| ()));
+        verdict.is_ok()
+    }
+
+    /// One tick of the filter, on the held value whatever the jitter of the samples; both outputs
+    /// less `offset`. `limit` is the largest age, ticks.
+    pub(super) fn step(
+        &mut self,
+        low_pass: &LowPass,
+        offset: Q16,
+        now: Tick,
+        limit: u32,
+    ) -> Filtered {
+        let filtered = match &mut self.filter {
+            Some(filter) => low_pass.step(filter, self.value),
+            none => {
+                *none = self.freshness.good.map(|_| LowPassState::at(self.value));
+                self.value
+            }
+        };
+        Filtered {
+            reading: self.freshness.reading(self.value - offset, now, limit),
+            filtered: filtered - offset,
+        }
+    }
+}
+
 #[cfg(test)]
-#[allow(clippy::float_arithmetic, reason = "the reference is in f64")]
 mod tests {
     use super::*;
 

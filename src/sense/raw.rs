@@ -2,72 +2,56 @@
 
 use crate::units::Tick;
 
-/// Quadrature counter of the wheel encoder: 16 bits, wraps. At most half a turn of the counter
-/// (32767 counts, 628 mm) may lie between two readings.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct EncoderCount(u16);
+/// Declares raw codes of 16 bits.
+macro_rules! raw_codes {
+    ($($(#[$doc:meta])* $name:ident;)*) => {$(
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+        pub struct $name(u16);
+
+        impl $name {
+            /// A code as read from the peripheral.
+            pub const fn new(code: u16) -> Self {
+                Self(code)
+            }
+
+            /// The bare code.
+            pub const fn get(self) -> u16 {
+                self.0
+            }
+        }
+    )*};
+}
+
+raw_codes! {
+    /// Quadrature counter of the wheel encoder: 16 bits, wraps. At most half a turn of the counter
+    /// (32767 counts, 628 mm) may lie between two readings.
+    EncoderCount;
+    /// Result of an oversampled conversion, left-justified to 16 bits whatever the
+    /// oversampling: 0 is the negative reference, 65535 the positive one.
+    AdcCode;
+    /// A 16-bit frame of the magnetic angle encoder, undecoded: bit 15 even parity
+    /// over the frame, bit 14 error flag, bits 13 to 0 the angle (16384 a turn).
+    AngleFrame;
+    /// Mean output of a motor's bridge, the difference of its two legs, through divider and
+    /// low-pass: 12 bits, [`BridgeCode::CENTRE`] is no voltage. A code is 20 parts in 2^15 of the
+    /// supply: the range ends at a duty of 1.25 in both directions, and the noise fits one byte a
+    /// tick in the log.
+    BridgeCode;
+}
 
 impl EncoderCount {
-    /// A counter value as read from the timer.
-    pub const fn new(count: u16) -> Self {
-        Self(count)
-    }
-
     /// Counts from `earlier` to `self`, positive in the direction of deployment.
     pub const fn since(self, earlier: Self) -> i16 {
         self.0.wrapping_sub(earlier.0) as i16
     }
-
-    /// The bare counter value.
-    pub const fn get(self) -> u16 {
-        self.0
-    }
 }
-
-/// Result of an oversampled conversion, left-justified to 16 bits whatever the
-/// oversampling: 0 is the negative reference, 65535 the positive one.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct AdcCode(u16);
-
-impl AdcCode {
-    /// A code as read from the converter.
-    pub const fn new(code: u16) -> Self {
-        Self(code)
-    }
-
-    /// The bare code, 0 to 65535.
-    pub const fn get(self) -> u16 {
-        self.0
-    }
-}
-
-/// A 16-bit frame of the magnetic angle encoder, undecoded: bit 15 even parity
-/// over the frame, bit 14 error flag, bits 13 to 0 the angle (16384 a turn).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct AngleFrame(u16);
 
 impl AngleFrame {
     /// In place of an angle whose sensor reports that its magnet is missing, too weak or too
     /// strong: the error flag with code 0 and right parity.
     pub const NO_FIELD: Self = Self(0xC000);
-
-    /// A frame as shifted in from the bus.
-    pub const fn new(frame: u16) -> Self {
-        Self(frame)
-    }
-
-    /// The bare frame.
-    pub const fn get(self) -> u16 {
-        self.0
-    }
 }
-
-/// Mean output of a motor's bridge, the difference of its two legs, through divider and
-/// low-pass: 12 bits, [`BridgeCode::CENTRE`] is no voltage. A code is 20 parts in 2^15 of the
-/// supply: the range ends at a duty of 1.25 in both directions, and the noise fits one byte a tick in
-/// the log.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct BridgeCode(u16);
 
 impl BridgeCode {
     /// Code without voltage.
@@ -75,21 +59,11 @@ impl BridgeCode {
     /// Duty of a code, LSB of Q15.
     pub const DUTY: i32 = 20;
 
-    /// A code as read from the converter.
-    pub const fn new(code: u16) -> Self {
-        Self(code)
-    }
-
     /// The code of a duty, Q15, at the nominal supply; saturates.
     pub const fn of(duty: i32) -> Self {
         let code = (duty + Self::DUTY * Self::CENTRE as i32 + Self::DUTY / 2) / Self::DUTY;
         let end = 2 * Self::CENTRE as i32 - 1;
         Self(if code < 0 { 0 } else { (if code > end { end } else { code }) as u16 })
-    }
-
-    /// The bare code.
-    pub const fn get(self) -> u16 {
-        self.0
     }
 
     /// The duty that gives it at the nominal supply, Q15.

@@ -3,9 +3,9 @@
 #![deny(clippy::float_arithmetic)]
 
 use super::analog::{AnalogChannel, AnalogState, Zeroing};
-use super::angle::{AngleSensor, AngleState};
+use super::angle::AngleSensor;
 use super::arm::Arm;
-use super::freshness::Reading;
+use super::freshness::{LastGood, Reading, Validity};
 use super::raw::SensorFrame;
 use super::speed::{self, SpeedState, Speedometer};
 use crate::rig::{Rig, RigError};
@@ -64,7 +64,7 @@ pub struct SensesState {
     wheel_encoder: SpeedState,
     preload_sensor: AnalogState,
     compression_sensor: AnalogState,
-    arm_angle: AngleState,
+    arm_angle: LastGood,
     level: Option<u8>,
 }
 
@@ -104,7 +104,6 @@ impl Senses {
     #[allow(clippy::float_arithmetic, reason = "SI to machine units, once at start")]
     pub fn try_build_tuned(rig: &Rig, tuning: &Tuning) -> Result<Self, RigError> {
         let arm = Arm::try_build(rig)?;
-        let (lo, hi) = arm.reach();
         Ok(Self {
             wheel_encoder: Speedometer::try_build(rig, tuning.speed_bandwidth_rad_s)?,
             preload_sensor: AnalogChannel::try_build(
@@ -117,7 +116,7 @@ impl Senses {
                 rig.sense.tread_full_scale_mm,
                 tuning.tread_tau_s,
             )?,
-            arm_angle: AngleSensor::build(rig.sense.angle_zero_code, lo, hi, tuning.arm_tau_s),
+            arm_angle: AngleSensor::build(rig.sense.angle_zero_code, arm.reach, tuning.arm_tau_s),
             arm,
             limit: libm::round(rig.sense.stale_after_s * f64::from(TICK_HZ)) as u32,
         })
@@ -125,7 +124,7 @@ impl Senses {
 
     /// Largest zero correction of the preload sensor, N.
     pub const fn preload_zero_limit(&self) -> Newtons {
-        self.preload_sensor.zero_limit()
+        self.preload_sensor.zero_limit
     }
 
     /// One tick: `frame` holds the latest codes, new or not; `acceleration` is that of the speed
@@ -138,19 +137,14 @@ impl Senses {
         acceleration: MillimetresPerSecond2,
     ) -> SensedState {
         let limit = self.limit;
-        let motion = self.wheel_encoder.step(
-            &mut state.wheel_encoder,
-            now,
-            frame.wheel_encoder,
-            acceleration,
-            limit,
-        );
-        let preload = &mut state.preload_sensor;
-        let preload = self.preload_sensor.step(preload, now, frame.preload_sensor, limit);
-        let compression = &mut state.compression_sensor;
-        let compression =
-            self.compression_sensor.step(compression, now, frame.compression_sensor, limit);
-        let angle = self.arm_angle.step(&mut state.arm_angle, now, frame.arm_angle, limit);
+        let SensesState { wheel_encoder, preload_sensor, compression_sensor, arm_angle, .. } =
+            state;
+        let wheel = frame.wheel_encoder;
+        let motion = self.wheel_encoder.step(wheel_encoder, now, wheel, acceleration, limit);
+        let preload = self.preload_sensor.step(preload_sensor, now, frame.preload_sensor, limit);
+        let pressed = frame.compression_sensor;
+        let compression = self.compression_sensor.step(compression_sensor, now, pressed, limit);
+        let angle = self.arm_angle.step(arm_angle, now, frame.arm_angle, limit);
         let (radius, tan_arm) = self.arm.stance(angle.filtered);
         let steps_up = self.arm.steps_up(radius, compression.filtered);
         let level = self.arm.level(state.level, steps_up);
@@ -164,11 +158,35 @@ impl Senses {
             preload_filtered: preload.filtered,
             compression: compression.reading,
             compression_filtered: compression.filtered,
-            radius: angle.reading.with(radius),
+            radius: Reading { value: radius, ..angle.reading },
             tan_arm,
             steps_up,
             level: state.level.unwrap_or(0),
         }
+    }
+}
+
+impl SensedState {
+    /// Validity of wheel encoder, preload sensor, compression sensor and arm angle.
+    pub const fn validities(&self) -> [Validity; 4] {
+        [
+            self.speed.validity,
+            self.preload.validity,
+            self.compression.validity,
+            self.radius.validity,
+        ]
+    }
+
+    /// The same, to be set.
+    #[cfg(test)]
+    pub(crate) const fn validities_mut(&mut self) -> [&mut Validity; 4] {
+        let Self { speed, preload, compression, radius, .. } = self;
+        [
+            &mut speed.validity,
+            &mut preload.validity,
+            &mut compression.validity,
+            &mut radius.validity,
+        ]
     }
 }
 
@@ -184,19 +202,16 @@ pub struct Zeros {
 impl SensesState {
     /// A start with these zeros.
     pub fn with(zeros: Zeros) -> Self {
-        Self {
-            preload_sensor: AnalogState::with(zeros.preload),
-            compression_sensor: AnalogState::with(zeros.compression),
-            ..Self::default()
-        }
+        let mut state = Self::default();
+        state.preload_sensor.offset = zeros.preload;
+        state.compression_sensor.offset = zeros.compression;
+        state
     }
 
     /// The zeros that apply.
     pub const fn zeros(&self) -> Zeros {
-        Zeros {
-            preload: self.preload_sensor.offset(),
-            compression: self.compression_sensor.offset(),
-        }
+        let (preload, compression) = (self.preload_sensor.offset, self.compression_sensor.offset);
+        Zeros { preload, compression }
     }
 
     /// Starts taking the zero of preload and compression sensor.
@@ -207,7 +222,7 @@ impl SensesState {
 
     /// Result of taking both zeros: none while in progress, then whether both were accepted.
     pub const fn zeroed(&self) -> Option<bool> {
-        match (self.preload_sensor.zeroing(), self.compression_sensor.zeroing()) {
+        match (self.preload_sensor.zeroing, self.compression_sensor.zeroing) {
             (Zeroing::Done, Zeroing::Done) => Some(true),
             (Zeroing::Running { .. } | Zeroing::Off, _)
             | (_, Zeroing::Running { .. } | Zeroing::Off) => None,
@@ -219,7 +234,6 @@ impl SensesState {
 #[cfg(test)]
 #[allow(clippy::float_arithmetic, reason = "the reference is in f64")]
 mod tests {
-    use super::super::freshness::Validity;
     use super::super::raw::{AdcCode, AngleFrame, EncoderCount, Sample};
     use super::*;
 
@@ -288,14 +302,7 @@ mod tests {
         near(sensed.steps_up, 1.0, 0.006);
         assert_eq!(sensed.level, 1);
         assert!((sensed.travel.to_num::<f64>() - 36.0).abs() <= 0.02);
-        for validity in [
-            sensed.speed.validity,
-            sensed.preload.validity,
-            sensed.compression.validity,
-            sensed.radius.validity,
-        ] {
-            assert_eq!(validity, Validity::Valid);
-        }
+        assert_eq!(sensed.validities(), [Validity::Valid; 4]);
     }
 
     #[test]
@@ -314,16 +321,9 @@ mod tests {
                 }
                 sensed = senses.step(&mut state, now, &mixed, Default::default());
             }
-            let validities = [
-                sensed.speed.validity,
-                sensed.preload.validity,
-                sensed.compression.validity,
-                sensed.radius.validity,
-            ];
-            for (sensor, validity) in validities.into_iter().enumerate() {
-                let expected = if sensor == silent { Validity::Stale } else { Validity::Valid };
-                assert_eq!(validity, expected, "sensor {sensor}, silent {silent}");
-            }
+            let mut expected = [Validity::Valid; 4];
+            expected[silent] = Validity::Stale;
+            assert_eq!(sensed.validities(), expected, "silent {silent}");
         }
     }
 

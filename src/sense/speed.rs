@@ -98,7 +98,7 @@ impl Speedometer {
         limit: u32,
     ) -> Motion {
         predict(state, acceleration);
-        let before = state.freshness.newest();
+        let before = state.freshness.newest;
         if let Some(sample) = state.freshness.take(sample) {
             self.correct(state, now, sample, before, limit);
         }
@@ -116,7 +116,7 @@ impl Speedometer {
         newest: Option<Tick>,
         limit: u32,
     ) {
-        let Some((before, newest)) = state.freshness.good().zip(newest) else {
+        let Some((before, newest)) = state.freshness.good.zip(newest) else {
             state.count = sample.code;
             state.error = 0;
             state.speed = 0;

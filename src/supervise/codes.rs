@@ -31,11 +31,9 @@ pub const fn of_mode(mode: Mode) -> u8 {
 
 /// The mode of a number; none if the number has no meaning.
 pub fn mode(number: u8) -> Option<Mode> {
+    let held = || Fault::ALL.into_iter().find(|fault| fault.code() == u16::from(number));
     let plain = Mode::WITHOUT_FAULT.get(usize::from(number)).copied();
-    plain.or_else(|| {
-        let held = Fault::ALL.iter().find(|fault| fault.code() == u16::from(number));
-        held.map(|fault| Mode::FaultHold(*fault))
-    })
+    plain.or_else(|| held().map(Mode::FaultHold))
 }
 
 /// The contact stage of a number, 1 to 6.
@@ -62,15 +60,13 @@ mod tests {
 
     #[test]
     fn every_mode_has_its_number() {
-        let held = Fault::ALL.into_iter().map(Mode::FaultHold);
-        let all: Vec<Mode> = Mode::WITHOUT_FAULT.into_iter().chain(held).collect();
-        for known in &all {
-            assert_eq!(mode(of_mode(*known)), Some(*known));
+        for known in Mode::all() {
+            assert_eq!(mode(of_mode(known)), Some(known));
         }
         let places = Mode::WITHOUT_FAULT.into_iter().map(of_mode);
         assert!(places.eq(0..Mode::WITHOUT_FAULT.len() as u8));
         let known = (0..=u8::MAX).filter(|number| mode(*number).is_some()).count();
-        assert_eq!(known, all.len());
+        assert_eq!(known, Mode::all().count());
     }
 
     #[test]

@@ -4,6 +4,9 @@
 
 #![deny(clippy::float_arithmetic)]
 
+use heapless::HistoryBuf;
+
+use super::monitor::lasts;
 use crate::fault::Fault;
 use crate::numeric::checked;
 use crate::rig::{Rig, RigError, SHORT_PART, START_LAG_MM};
@@ -13,8 +16,6 @@ use crate::units::{
 
 /// Ticks between the three positions of an acceleration.
 const SPAN: usize = 6;
-/// Room for the positions of two spans.
-const KEPT: usize = 16;
 /// Distance by which reference and encoder may bend apart within two spans, counts. Three
 /// readings of a counter are off by less than 2 counts together; a third full count takes
 /// `1 / (6 ms)^2`, 530 mm/s^2 beyond the reference: twice the acceleration of the profile. Of
@@ -44,7 +45,7 @@ const TELLING: MillimetresPerSecond = q16(10_000_000);
 const EFFORT: (Ratio, Ratio) = (q16(-50_000), q16(130_000));
 /// Ticks for which it must be outside: more than two time constants of the loop, in which it
 /// settles after a corner.
-const EFFORT_TICKS: u8 = 120;
+const EFFORT_TICKS: u16 = 120;
 /// Dead times and lags of its slew by which a preload may be short: what it makes with these off by
 /// half. At least a part of the cruise preload.
 const SHORT_LATENCIES: f64 = 0.5;
@@ -52,7 +53,7 @@ const SHORT_LATENCIES: f64 = 0.5;
 /// an actuator whose dead time, lag and slew are all off.
 const STRAYED: f64 = 2.5;
 /// Ticks for which it must deviate.
-const STRAYED_TICKS: u8 = 10;
+const STRAYED_TICKS: u16 = 10;
 /// Equal codes in a row that count as stuck if the preload has to change meanwhile, or if nothing
 /// is known of the sensor's noise.
 const STUCK: u16 = 64;
@@ -80,7 +81,7 @@ pub(super) struct CrossCheck {
     /// See [`START_LAG_MM`], mm.
     start_lag: Millimetres,
     /// See [`SHORT_LATENCIES`] and [`STRAYED`], N.
-    short: Newtons,
+    pub(super) short: Newtons,
     strayed: Newtons,
 }
 
@@ -140,15 +141,12 @@ const fn run_of(changes: u16) -> u16 {
 }
 
 /// State between ticks.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct CrossState {
     /// Travel of the reference since the drive was switched on.
     reference: Travel,
-    /// Encoder less reference, mm, of the last ticks.
-    past: [Millimetres; KEPT],
-    /// Ticks that they hold, up to [`KEPT`], and where the next one goes.
-    held: u8,
-    head: u8,
+    /// Encoder less reference, mm, of the ticks of the last two spans, the oldest first.
+    past: HistoryBuf<Millimetres, { 2 * SPAN }>,
     at: Tick,
     /// Encoder and reference at the last progress.
     progress: (Travel, Travel),
@@ -157,8 +155,8 @@ pub(super) struct CrossState {
     /// Radius and encoder when arm and wheel were last set equal, and the ticks since.
     arm: (Millimetres, Travel),
     arm_ticks: u8,
-    effort: u8,
-    strayed: u8,
+    effort: u16,
+    strayed: u16,
     preload: CodeState,
     compression: CodeState,
 }
@@ -237,21 +235,13 @@ impl CrossCheck {
         noise: &Noise,
         seen: &Compared,
     ) -> Option<Fault> {
-        let (preload, due) = (seen.preload, seen.preload_due);
         let limits = Limits { stuck: noise.preload.stuck, jump: JUMP_N, due: self.telling() };
-        let unsound = judge(&mut state.preload, preload, due, &limits);
+        let unsound = judge(&mut state.preload, seen.preload, seen.preload_due, &limits);
         let off = seen.preload_off.abs() > self.strayed;
         let strayed = lasts(&mut state.strayed, off, STRAYED_TICKS);
-        if unsound {
-            Some(Fault::PreloadSensorImplausible)
-        } else {
-            strayed.then_some(Fault::PretightenerRunaway)
-        }
-    }
-
-    /// Deviation by which a preload is short, N.
-    pub(super) const fn short(&self) -> Newtons {
-        self.short
+        unsound
+            .then_some(Fault::PreloadSensorImplausible)
+            .or(strayed.then_some(Fault::PretightenerRunaway))
     }
 
     /// Change of the preload that no sensor sleeps through, N: half of what counts as astray.
@@ -280,21 +270,13 @@ impl CrossCheck {
             seen.speed_ref.abs() > TELLING && !(EFFORT.0..=EFFORT.1).contains(&along)
         });
         let effort = lasts(&mut state.effort, effort, EFFORT_TICKS);
-        if bent {
-            Some(Fault::DriveRunaway)
-        } else if preload == Some(Fault::PreloadSensorImplausible) {
-            preload
-        } else if unsound {
-            Some(Fault::CompressionSensorImplausible)
-        } else if arm {
-            Some(Fault::ArmMismatch)
-        } else if lags {
-            Some(Fault::DriveStalled)
-        } else if effort {
-            Some(Fault::DutyMismatch)
-        } else {
-            preload
-        }
+        bent.then_some(Fault::DriveRunaway)
+            .or(preload.filter(|fault| *fault == Fault::PreloadSensorImplausible))
+            .or(unsound.then_some(Fault::CompressionSensorImplausible))
+            .or(arm.then_some(Fault::ArmMismatch))
+            .or(lags.then_some(Fault::DriveStalled))
+            .or(effort.then_some(Fault::DutyMismatch))
+            .or(preload)
     }
 
     /// Whether the wheel leaves its reference: first or second difference of encoder less
@@ -304,21 +286,17 @@ impl CrossCheck {
         // A tick without a new reading, or one lost: the times would not be equal.
         let missed = seen.read_at != seen.now || seen.now.wrapping_sub(state.at) != 1;
         state.at = seen.now;
-        let now = Q16::narrow(seen.travel.wrapping_sub(state.reference));
-        let back = |ticks: usize| {
-            let place = usize::from(state.head).wrapping_sub(ticks) % KEPT;
-            state.past.get(place).copied().unwrap_or(now)
-        };
-        let (middle, old) = (back(SPAN), back(2 * SPAN));
-        if let Some(place) = state.past.get_mut(usize::from(state.head)) {
-            *place = now;
-        }
-        state.head = (state.head + 1) % KEPT as u8;
-        if missed || usize::from(state.held) < 2 * SPAN {
-            state.held = if missed { 0 } else { state.held + 1 };
+        if missed {
+            state.past.clear();
             return false;
         }
-        ((now - middle) - (middle - old)).abs() > self.bent || (now - old).abs() > self.off
+        let now = Q16::narrow(seen.travel.wrapping_sub(state.reference));
+        let mut past = state.past.oldest_ordered().copied();
+        let spans = past.next().zip(past.nth(SPAN - 1)).filter(|_| state.past.is_full());
+        state.past.write(now);
+        spans.is_some_and(|(old, middle)| {
+            ((now - middle) - (middle - old)).abs() > self.bent || (now - old).abs() > self.off
+        })
     }
 
     /// Whether the reference goes on while the wheel does not.
@@ -375,18 +353,11 @@ fn judge(state: &mut CodeState, value: Q16, due: Newtons, limits: &Limits) -> bo
     state.same >= limits.stuck || sleeps || state.erratic >= ERRATIC
 }
 
-/// Counts ticks while a condition lasts, and whether they are `enough`.
-fn lasts(count: &mut u8, condition: bool, enough: u8) -> bool {
-    *count = if condition { count.saturating_add(1) } else { 0 };
-    *count >= enough
-}
-
 impl CrossState {
     /// Starts with the drive, which has been at rest until now.
     pub(super) fn begin(&mut self, seen: &Compared) {
         *self = Self {
-            past: [Q16::narrow(seen.travel); KEPT],
-            held: 2 * SPAN as u8,
+            past: HistoryBuf::new_with(Q16::narrow(seen.travel)),
             at: seen.now.wrapping_sub(1),
             progress: (seen.travel, Travel::ZERO),
             strayed: self.strayed,

@@ -339,14 +339,10 @@ fn off_by_exactly_the_threshold_is_tolerated() {
     let check = CrossCheck::try_build(&Rig::prototype()).expect("a sound rig");
     // Steadily away from the reference: half of the distance in each span.
     let drifts = |distance: Q16| {
-        let mut past = [Q16::ZERO; KEPT];
+        let mut past = [Q16::ZERO; 2 * SPAN];
         past[SPAN] = distance.half();
-        let mut state = CrossState {
-            past,
-            held: 2 * SPAN as u8,
-            head: 2 * SPAN as u8,
-            ..CrossState::default()
-        };
+        let mut state = CrossState::default();
+        state.past.extend(past);
         check.bends(&mut state, &off_by(1, distance))
     };
     let off = check.off;

@@ -99,6 +99,12 @@ impl Mode {
         ]
     };
 
+    /// Every mode.
+    #[cfg(test)]
+    pub(super) fn all() -> impl Iterator<Item = Self> {
+        Self::WITHOUT_FAULT.into_iter().chain(Fault::ALL.map(Self::FaultHold))
+    }
+
     /// The mode in words, as the logs have it.
     pub const fn words(self) -> &'static str {
         use Direction::{Deploy, Retract};
@@ -109,18 +115,14 @@ impl Mode {
             Self::Idle => "idle",
             Self::Preload(Deploy) => "preloading to deploy",
             Self::Preload(Retract) => "preloading to retract",
-            Self::Run(Deploy, leg) => match leg {
-                Leg::Cruise => "deploying: cruise",
-                Leg::Approach => "deploying: approach",
-                Leg::Crossing => "deploying: crossing",
-                Leg::Settle => "deploying: settle",
-            },
-            Self::Run(Retract, leg) => match leg {
-                Leg::Cruise => "retracting: cruise",
-                Leg::Approach => "retracting: approach",
-                Leg::Crossing => "retracting: crossing",
-                Leg::Settle => "retracting: settle",
-            },
+            Self::Run(Deploy, Leg::Cruise) => "deploying: cruise",
+            Self::Run(Deploy, Leg::Approach) => "deploying: approach",
+            Self::Run(Deploy, Leg::Crossing) => "deploying: crossing",
+            Self::Run(Deploy, Leg::Settle) => "deploying: settle",
+            Self::Run(Retract, Leg::Cruise) => "retracting: cruise",
+            Self::Run(Retract, Leg::Approach) => "retracting: approach",
+            Self::Run(Retract, Leg::Crossing) => "retracting: crossing",
+            Self::Run(Retract, Leg::Settle) => "retracting: settle",
             Self::Stopping(Deploy) => "stopping while deploying",
             Self::Stopping(Retract) => "stopping while retracting",
             Self::Complete(Deploy) => "deployed",

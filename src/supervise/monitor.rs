@@ -40,7 +40,7 @@ pub struct Monitor {
 }
 
 /// How long each condition has lasted, ticks.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct MonitorState {
     overpressure: u16,
     runaway: u16,
@@ -90,7 +90,7 @@ impl Monitor {
                 "preload.limit_n",
                 rig.preload.limit_n * (1.0 + OVERPRESSURE_PART),
             )?,
-            short: cross.short(),
+            short: cross.short,
             short_ticks: (answer_s(rig) * f64::from(TICK_HZ)) as u16,
             spring: checked("preload.spring_n_per_mm", rig.preload.spring_n_per_mm)?,
             answers: LowPass::build(answer_s(rig)),
@@ -114,37 +114,26 @@ impl Monitor {
             && (seen.mode.moves()
                 || seen.mode == Mode::Service
                 || acting && preload - seen.preload_due > self.short);
-        lasting(&mut state.overpressure, pressed);
+        let overpressure = lasts(&mut state.overpressure, pressed, OVERPRESSURE_TICKS);
         let off = self.off(state, seen, acting);
-        lasting(&mut state.short, off < -self.short);
+        let short = lasts(&mut state.short, off < -self.short, self.short_ticks);
         let serving = seen.mode == Mode::Service && state.readback.drives();
         state.coasts = if serving { COAST_TICKS } else { state.coasts.saturating_sub(1) };
         let turns = !seen.mode.moves() && speed.abs() > BEYOND && state.coasts == 0;
-        lasting(&mut state.runaway, turns);
-        let lost = sensor_fault(seen.sensed);
+        let runaway = lasts(&mut state.runaway, turns, RUNAWAY_TICKS);
         // The self-test ends once the wheel rests.
         let coasts = seen.mode == Mode::SelfTest;
         let bridge = self.readback.step(&mut state.readback, seen.bridges, coasts);
         let crossed = self.cross_check(state, seen, off);
-        if seen.emergency_stop {
-            Some(Fault::EmergencyStop)
-        } else if seen.overrun {
-            Some(Fault::TickOverrun)
-        } else if state.overpressure >= OVERPRESSURE_TICKS {
-            Some(Fault::Overpressure)
-        } else if lost.is_some() {
-            lost
-        } else if bridge.is_some() {
-            bridge
-        } else if state.runaway >= RUNAWAY_TICKS {
-            Some(Fault::DriveRunaway)
-        } else if crossed.is_some() {
-            crossed
-        } else if state.short >= self.short_ticks {
-            Some(Fault::PreloadNotReached)
-        } else {
-            None
-        }
+        seen.emergency_stop
+            .then_some(Fault::EmergencyStop)
+            .or(seen.overrun.then_some(Fault::TickOverrun))
+            .or(overpressure.then_some(Fault::Overpressure))
+            .or(sensor_fault(seen.sensed))
+            .or(bridge)
+            .or(runaway.then_some(Fault::DriveRunaway))
+            .or(crossed)
+            .or(short.then_some(Fault::PreloadNotReached))
     }
 
     /// Preload off what the actuator should have reached, N, beyond what the wheel has moved the
@@ -207,30 +196,28 @@ impl MonitorState {
     }
 }
 
-/// Counts ticks while a condition lasts.
-fn lasting(count: &mut u16, condition: bool) {
+/// Counts ticks while a condition lasts, and whether they are `enough`.
+pub(super) fn lasts(count: &mut u16, condition: bool, enough: u16) -> bool {
     *count = if condition { count.saturating_add(1) } else { 0 };
+    *count >= enough
 }
 
 /// The fault of a sensor that cannot be used any more.
 fn sensor_fault(sensed: &SensedState) -> Option<Fault> {
-    let judge = |validity: Validity, stale: Fault, range: Fault| match validity {
-        Validity::Valid | Validity::Held(_) => None,
-        Validity::Absent | Validity::Stale => Some(stale),
-        Validity::Invalid(Reason::OutOfRange) => Some(range),
-        Validity::Invalid(_) => Some(stale),
-    };
-    judge(sensed.speed.validity, Fault::WheelEncoderStale, Fault::WheelEncoderStale)
-        .or(judge(sensed.preload.validity, Fault::PreloadSensorStale, Fault::PreloadSensorRange))
-        .or(judge(
-            sensed.compression.validity,
-            Fault::CompressionSensorStale,
-            Fault::CompressionSensorRange,
-        ))
-        .or(match sensed.radius.validity {
+    let faults = [
+        (Fault::WheelEncoderStale, Fault::WheelEncoderStale),
+        (Fault::PreloadSensorStale, Fault::PreloadSensorRange),
+        (Fault::CompressionSensorStale, Fault::CompressionSensorRange),
+        (Fault::ArmAngleStale, Fault::ArmAngleRange),
+    ];
+    sensed.validities().into_iter().zip(faults).find_map(
+        |(validity, (stale, range))| match validity {
+            Validity::Valid | Validity::Held(_) => None,
+            Validity::Invalid(Reason::OutOfRange) => Some(range),
             Validity::Invalid(Reason::NoField) => Some(Fault::ArmAngleMagnet),
-            validity => judge(validity, Fault::ArmAngleStale, Fault::ArmAngleRange),
-        })
+            _ => Some(stale),
+        },
+    )
 }
 
 #[cfg(test)]

@@ -15,27 +15,19 @@ const UNLOADED: Newtons = q16(3_000_000);
 /// Compression that still counts as none, mm.
 const UNPRESSED: Millimetres = q16(100_000);
 
-/// Whether all sensors have answered with good codes.
-pub fn all_answer(sensed: &SensedState) -> bool {
-    sensed.speed.is_usable()
-        && sensed.preload.is_usable()
-        && sensed.compression.is_usable()
-        && sensed.radius.is_usable()
-}
-
-/// The fault of the first sensor that has not answered.
-pub fn silent(sensed: &SensedState) -> Fault {
-    if !sensed.speed.is_usable() {
-        Fault::WheelEncoderStale
-    } else if !sensed.preload.is_usable() {
-        Fault::PreloadSensorStale
-    } else if !sensed.compression.is_usable() {
-        Fault::CompressionSensorStale
-    } else if sensed.radius.validity == Validity::Invalid(Reason::NoField) {
-        Fault::ArmAngleMagnet
-    } else {
-        Fault::ArmAngleStale
-    }
+/// The fault of the first sensor that has not answered with good codes; none if all have.
+pub fn silent(sensed: &SensedState) -> Option<Fault> {
+    let stale = [
+        Fault::WheelEncoderStale,
+        Fault::PreloadSensorStale,
+        Fault::CompressionSensorStale,
+        Fault::ArmAngleStale,
+    ];
+    sensed.validities().into_iter().zip(stale).find_map(|(validity, stale)| match validity {
+        Validity::Valid | Validity::Held(_) => None,
+        Validity::Invalid(Reason::NoField) => Some(Fault::ArmAngleMagnet),
+        _ => Some(stale),
+    })
 }
 
 /// Whether the wheel rests.
@@ -58,20 +50,13 @@ pub fn stowed(sensed: &SensedState, pressed: Newtons, zero_limit: Newtons) -> bo
 #[allow(clippy::float_arithmetic, reason = "quantities of a test")]
 mod tests {
     use super::*;
-    use crate::rig::Rig;
-    use crate::sense::raw::SensorFrame;
-    use crate::sense::{Senses, SensesState};
     use crate::units::Q16;
 
     /// Sensor values on this wall, at this speed, preload and compression.
     fn sensed(level: u8, speed: f64, preload: f64, compression: f64) -> SensedState {
-        let senses = Senses::try_build(&Rig::prototype()).expect("sound");
-        let nothing = SensorFrame::default();
-        let mut sensed = senses.step(&mut SensesState::default(), 0, &nothing, Q16::ZERO);
-        sensed.level = level;
+        let mut sensed = crate::estimate::sensed(level, 0.0, compression);
         sensed.speed.value = Q16::from_num(speed);
         sensed.preload_filtered = Q16::from_num(preload);
-        sensed.compression_filtered = Q16::from_num(compression);
         sensed
     }
 
@@ -117,11 +102,9 @@ mod tests {
     #[test]
     fn each_sensor_that_has_not_answered_is_named() {
         let mut all = sensed(0, 0.0, 0.0, 0.0);
-        all.speed.validity = Validity::Valid;
-        all.preload.validity = Validity::Valid;
+        all.validities_mut().into_iter().for_each(|validity| *validity = Validity::Valid);
         all.compression.validity = Validity::Held(Reason::OutOfRange);
-        all.radius.validity = Validity::Valid;
-        assert!(all_answer(&all));
+        assert_eq!(silent(&all), None);
         let missing = [
             Fault::WheelEncoderStale,
             Fault::PreloadSensorStale,
@@ -130,17 +113,10 @@ mod tests {
         ];
         for (sensor, fault) in missing.into_iter().enumerate() {
             let mut seen = all;
-            let places = [
-                &mut seen.speed.validity,
-                &mut seen.preload.validity,
-                &mut seen.compression.validity,
-                &mut seen.radius.validity,
-            ];
-            *places.into_iter().nth(sensor).expect("one of four") = Validity::Absent;
-            assert!(!all_answer(&seen), "{fault:?}");
-            assert_eq!(silent(&seen), fault);
+            *seen.validities_mut()[sensor] = Validity::Absent;
+            assert_eq!(silent(&seen), Some(fault));
         }
         all.radius.validity = Validity::Invalid(Reason::NoField);
-        assert_eq!(silent(&all), Fault::ArmAngleMagnet);
+        assert_eq!(silent(&all), Some(Fault::ArmAngleMagnet));
     }
 }

@@ -91,52 +91,44 @@ pub const fn next(mode: Mode, trigger: Trigger) -> Option<Mode> {
 mod tests {
     use super::*;
 
-    fn modes() -> Vec<Mode> {
-        let holds = Fault::ALL.map(Mode::FaultHold);
-        Mode::WITHOUT_FAULT.into_iter().chain(holds).collect()
+    fn triggers() -> impl Iterator<Item = Trigger> {
+        Trigger::WITHOUT_FAULT.into_iter().chain(Fault::ALL.map(Trigger::Fault))
     }
 
-    fn triggers() -> Vec<Trigger> {
-        let faults = Fault::ALL.map(Trigger::Fault);
-        Trigger::WITHOUT_FAULT.into_iter().chain(faults).collect()
+    /// Every mode with every trigger.
+    fn all() -> impl Iterator<Item = (Mode, Trigger)> {
+        Mode::all().flat_map(|mode| triggers().map(move |trigger| (mode, trigger)))
     }
 
     #[test]
     fn a_fault_holds_from_every_mode_and_the_first_is_kept() {
-        for mode in modes() {
+        for mode in Mode::all() {
             for fault in Fault::ALL {
-                match mode {
-                    Mode::FaultHold(_) => assert_eq!(next(mode, Trigger::Fault(fault)), None),
-                    _ => {
-                        assert_eq!(next(mode, Trigger::Fault(fault)), Some(Mode::FaultHold(fault)))
-                    }
-                }
+                let first = !matches!(mode, Mode::FaultHold(_));
+                let held = first.then_some(Mode::FaultHold(fault));
+                assert_eq!(next(mode, Trigger::Fault(fault)), held);
             }
         }
     }
 
     #[test]
     fn only_a_reached_preload_starts_motion() {
-        for mode in modes() {
-            for trigger in triggers() {
-                let starts = next(mode, trigger).is_some_and(Mode::moves) && !mode.moves();
-                assert!(!starts || trigger == Trigger::PreloadReached, "{mode:?} {trigger:?}");
-            }
+        for (mode, trigger) in all() {
+            let starts = next(mode, trigger).is_some_and(Mode::moves) && !mode.moves();
+            assert!(!starts || trigger == Trigger::PreloadReached, "{mode:?} {trigger:?}");
         }
     }
 
     #[test]
     fn the_service_mode_is_entered_from_idle_alone_and_left_by_the_self_test_alone() {
-        for mode in modes() {
-            for trigger in triggers() {
-                let after = next(mode, trigger);
-                if after == Some(Mode::Service) {
-                    assert_eq!((mode, trigger), (Mode::Idle, Trigger::Service));
-                }
-                if mode == Mode::Service {
-                    let out = matches!(after, None | Some(Mode::SelfTest | Mode::FaultHold(_)));
-                    assert!(out, "{trigger:?} {after:?}");
-                }
+        for (mode, trigger) in all() {
+            let after = next(mode, trigger);
+            if after == Some(Mode::Service) {
+                assert_eq!((mode, trigger), (Mode::Idle, Trigger::Service));
+            }
+            if mode == Mode::Service {
+                let out = matches!(after, None | Some(Mode::SelfTest | Mode::FaultHold(_)));
+                assert!(out, "{trigger:?} {after:?}");
             }
         }
     }
@@ -146,11 +138,8 @@ mod tests {
         let mut reached = vec![Mode::Boot];
         let mut at = 0;
         while let Some(&mode) = reached.get(at) {
-            let next: Vec<Mode> = triggers()
-                .into_iter()
-                .filter_map(|t| next(mode, t))
-                .filter(|m| *m != mode)
-                .collect();
+            let next = triggers().filter_map(|t| next(mode, t)).filter(|m| *m != mode);
+            let next: Vec<Mode> = next.collect();
             assert!(!next.is_empty(), "{mode:?} is a trap");
             for mode in next {
                 if !reached.contains(&mode) {
@@ -159,7 +148,7 @@ mod tests {
             }
             at += 1;
         }
-        assert_eq!(reached.len(), modes().len());
+        assert_eq!(reached.len(), Mode::all().count());
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 use super::{Controller, State, TickContext};
 use crate::control::schedule::{Course, Targets};
+use crate::control::speed_loop::SpeedLoopState;
 use crate::numeric::{between, divide};
 use crate::supervise::{Mode, Trigger};
 use crate::units::{
@@ -35,19 +36,17 @@ impl Controller {
             reference: state.preload_loop.reference(tick.sensed.preload.value),
             preload: estimate.remembered_preload(),
             preload_late: state.preload_loop.due() - tick.sensed.preload_filtered
-                > self.schedule.reached_within(),
+                > self.schedule.reached_within,
         }
     }
 
     /// Schedule of this tick; holds preload and position while nothing runs.
     pub(super) fn targets(&self, state: &mut State, tick: &mut TickContext<'_>) -> Targets {
         let hold = Targets {
-            speed: Q16::ZERO,
             preload: state.preload_loop.reference(tick.sensed.preload.value),
             ramping: state.approach.ramping,
             begun: state.approach.begun,
-            approaching: false,
-            waiting: false,
+            ..Targets::default()
         };
         let (direction, running) = match state.mode {
             Mode::Preload(direction) => (direction, false),
@@ -69,10 +68,6 @@ impl Controller {
             plan.approach.window_speed = plan.approach.window_speed.min(self.least_speed);
         }
         let mut targets = self.schedule.targets(self.estimator.steps(), &plan, &course);
-        let (step, cross_speed) = (plan.step, plan.cross_speed);
-        let (cross_preload, ramp_preload) = (plan.cross_preload, plan.ramp_preload);
-        let (most_preload, slowest_speed) = (plan.most_preload, plan.approach.slowest_speed);
-        let needs = plan.brake_horizon + plan.approach.window_from.abs();
         state.approach.ramping = targets.ramping;
         state.approach.begun = targets.begun;
         if !running {
@@ -81,19 +76,20 @@ impl Controller {
         }
         let found = self.estimator.watch_expectation(&mut state.estimate);
         self.take_findings(state, tick, found);
-        self.limit_climb(state, &mut targets);
+        targets.speed = self.limit_climb(state, targets.speed);
         let surprised = state.estimate.slow_down();
-        let unplanned = step != state.estimate.next_step;
+        let unplanned = plan.step != state.estimate.next_step;
         if surprised || unplanned {
-            targets.preload = if surprised { cross_preload } else { ramp_preload };
+            targets.preload = if surprised { plan.cross_preload } else { plan.ramp_preload };
         }
         if surprised {
-            targets.speed = targets.speed.min(slowest_speed);
+            targets.speed = targets.speed.min(plan.approach.slowest_speed);
         }
         // Without its plan a step that is near is come to as the last one was crossed.
+        let needs = plan.brake_horizon + plan.approach.window_from.abs();
         let near = self.estimator.distance(&state.estimate).is_some_and(|ahead| ahead <= needs);
         if unplanned && near {
-            targets.speed = targets.speed.min(cross_speed);
+            targets.speed = targets.speed.min(plan.cross_speed);
         }
         state.approach.sped_up &= !state.estimate.critical();
         if let Some(speed) = state.estimate.lifting()
@@ -104,15 +100,16 @@ impl Controller {
         // A wheel that slips grips by more preload alone; deploying, it waits for that.
         let (slipping, slipped) = state.estimate.slips();
         if slipped {
-            targets.preload = most_preload;
-            targets.speed = targets.speed.min(cross_speed);
+            targets.preload = plan.most_preload;
+            targets.speed = targets.speed.min(plan.cross_speed);
         }
         self.learn_slip(state, tick);
-        let missing = most_preload - tick.sensed.preload_filtered > self.schedule.reached_within();
-        if slipping || slipped && missing && direction == Direction::Deploy {
+        let missing = plan.most_preload - tick.sensed.preload_filtered;
+        let waits = missing > self.schedule.reached_within && direction == Direction::Deploy;
+        if slipping || slipped && waits {
             targets.speed = targets.speed.min(self.least_speed);
         }
-        self.note_preload(state, tick, cross_preload, &targets);
+        self.note_preload(state, tick, plan.cross_preload, targets.waiting);
         let leg = state.leg(targets.approaching);
         if state.mode != Mode::Run(direction, leg) {
             tick.trigger(Trigger::Leg(leg));
@@ -138,11 +135,15 @@ impl Controller {
 
     /// On a corner the wheel's rise compresses the spring: limits the speed to what the
     /// pre-tightener can follow.
-    pub(super) fn limit_climb(&self, state: &State, targets: &mut Targets) {
-        if state.estimate.on_corner() {
-            let slope = self.estimator.corner().slope(self.ahead(state, Q16::ZERO));
-            targets.speed = self.followed(targets.speed, slope);
+    pub(super) fn limit_climb(
+        &self,
+        state: &State,
+        speed: MillimetresPerSecond,
+    ) -> MillimetresPerSecond {
+        if !state.estimate.on_corner() {
+            return speed;
         }
+        self.followed(speed, self.estimator.corner().slope(self.ahead(state, Q16::ZERO)))
     }
 
     /// `speed`, or the largest below it at which the pre-tightener still follows a spring
@@ -174,7 +175,7 @@ impl Controller {
             }
             Mode::Preload(_) => {
                 state.profile.halt();
-                state.speed_loop.reset();
+                state.speed_loop = SpeedLoopState::default();
                 return (MotorCommand::OFF, self.regulate(state, tick, targets, Q16::ZERO));
             }
             _ => {
@@ -187,10 +188,9 @@ impl Controller {
         // blended in, or the drive would jump.
         let (blend, added) = state.blend_corner();
         let wanted = state.signed_speed();
-        let (climb, drift) = if blend == Q16::ZERO {
-            (Q16::ZERO, Q16::ZERO)
-        } else {
-            self.corner(state, tick, targets.speed)
+        let (climb, drift) = match blend {
+            Q16::ZERO => (Q16::ZERO, Q16::ZERO),
+            _ => self.corner(state, tick, targets.speed),
         };
         let measured = tick.sensed.speed.value;
         let held = self.load_of(state);
@@ -230,10 +230,8 @@ impl Controller {
         targets: &Targets,
         drift: NewtonsPerSecond,
     ) -> MotorCommand {
-        let measured = tick.sensed.preload.value;
-        let duty =
-            self.preload_loop.step(&mut state.preload_loop, targets.preload, measured, drift);
-        MotorCommand::on(duty)
+        let (preload_loop, measured) = (&mut state.preload_loop, tick.sensed.preload.value);
+        MotorCommand::on(self.preload_loop.step(preload_loop, targets.preload, measured, drift))
     }
 
     /// Distance outwards from where the centre will be after `travel` to the face that it is

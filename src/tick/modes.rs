@@ -3,7 +3,7 @@
 use super::serve::view;
 use super::{Controller, Event, State, TickContext};
 use crate::fault::{Fault, Limit};
-use crate::supervise::startup::{TEST_TICKS, all_answer, at_rest, silent, stowed};
+use crate::supervise::startup::{TEST_TICKS, at_rest, silent, stowed};
 use crate::supervise::{Mode, Trigger, next};
 use crate::units::{Direction, Q16};
 
@@ -67,8 +67,11 @@ impl Controller {
     pub(super) fn advance_mode(&self, state: &mut State, tick: &mut TickContext<'_>) {
         state.in_mode = state.in_mode.saturating_add(1);
         match state.mode {
-            Mode::Boot if all_answer(tick.sensed) => tick.trigger(Trigger::SensorsAnswer),
-            Mode::Boot if state.in_mode >= BOOT_TICKS => tick.fail(silent(tick.sensed)),
+            Mode::Boot => match silent(tick.sensed) {
+                None => tick.trigger(Trigger::SensorsAnswer),
+                Some(fault) if state.in_mode >= BOOT_TICKS => tick.fail(fault),
+                Some(_) => {}
+            },
             Mode::SelfTest => self.await_rest(state, tick),
             Mode::Zero => self.await_zero(state, tick),
             Mode::Preload(direction) => self.await_preload(state, tick, direction),
@@ -108,7 +111,7 @@ impl Controller {
         let reached = state.planning.plan.as_ref().is_some_and(|plan| {
             let course = self.course(state, tick, direction);
             let targets = self.schedule.targets(self.estimator.steps(), plan, &course);
-            let enough = targets.preload - self.schedule.reached_within();
+            let enough = targets.preload - self.schedule.reached_within;
             tick.sensed.preload_filtered >= enough.min(plan.rolling_preload)
         });
         state.condition_ticks = if reached { state.condition_ticks + 1 } else { 0 };
@@ -147,21 +150,11 @@ impl Controller {
 #[cfg(test)]
 #[allow(clippy::float_arithmetic, reason = "quantities of a test")]
 mod tests {
-    use super::super::tests::{sensed, within};
+    use super::super::tests::{answering, within};
     use super::*;
-    use crate::sense::{SensedState, Validity};
+    use crate::sense::Validity;
     use crate::supervise::Command;
     use crate::units::q16;
-
-    /// Every sensor answers, and the wheel is at rest.
-    fn answering() -> SensedState {
-        let mut all = sensed(0, 0.0, 0.0);
-        all.speed.validity = Validity::Valid;
-        all.preload.validity = Validity::Valid;
-        all.compression.validity = Validity::Valid;
-        all.radius.validity = Validity::Valid;
-        all
-    }
 
     fn advance(controller: &Controller, state: &mut State, tick: &mut TickContext<'_>) {
         controller.advance_mode(state, tick);
@@ -188,8 +181,7 @@ mod tests {
 
     #[test]
     fn a_zero_that_is_not_taken_is_a_fault_after_two_seconds() {
-        let mut state = State::default();
-        state.mode = Mode::Zero;
+        let mut state = State { mode: Mode::Zero, ..State::default() };
         state.senses.begin_zero();
         within(&answering(), |controller, pass| {
             for tick in 1..2000 {
@@ -204,8 +196,7 @@ mod tests {
     #[test]
     fn a_wheel_that_does_not_stop_is_a_fault_after_a_second_and_a_half() {
         let stopping = |speed: Q16| {
-            let mut state = State::default();
-            state.mode = Mode::Stopping(Direction::Deploy);
+            let mut state = State { mode: Mode::Stopping(Direction::Deploy), ..State::default() };
             let mut turning = answering();
             turning.speed.value = speed;
             let ticks = within(&turning, |controller, pass| {
@@ -228,8 +219,7 @@ mod tests {
         for limit_n in [50.0, 60.0] {
             rig.preload.limit_n = limit_n;
             let controller = Controller::try_build(&rig).expect("sound");
-            let mut state = State::default();
-            state.mode = Mode::Preload(Direction::Deploy);
+            let mut state = State { mode: Mode::Preload(Direction::Deploy), ..State::default() };
             let ticks = within(&answering(), |_, pass| {
                 (1..20_000).find(|_| {
                     advance(&controller, &mut state, pass);
@@ -246,8 +236,7 @@ mod tests {
     fn bridges_are_armed_again_by_a_reset_from_a_fault_alone() {
         let idle = answering();
         let armed = |from: Mode, trigger: Trigger| {
-            let mut state = State::default();
-            state.mode = from;
+            let mut state = State { mode: from, ..State::default() };
             within(&idle, |controller, pass| {
                 assert!(next(state.mode, trigger).is_some());
                 pass.trigger(trigger);

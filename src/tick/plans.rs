@@ -1,7 +1,6 @@
 //! The exchange with the model task.
 
 use super::{Controller, CrossingRecord, Event, State, TickContext};
-use crate::control::schedule::Targets;
 use crate::estimate::OpenCrossing;
 use crate::fault::{Fault, Limit};
 use crate::model::plan::PLAN_TICKS;
@@ -105,16 +104,16 @@ impl Controller {
         state: &mut State,
         tick: &mut TickContext<'_>,
         cross_preload: Newtons,
-        targets: &Targets,
+        waiting: bool,
     ) {
         let missing = cross_preload - tick.sensed.preload_filtered;
-        let reached = missing <= self.schedule.reached_within();
+        let reached = missing <= self.schedule.reached_within;
         let approach = &mut state.approach;
         let since = approach.standing_since.unwrap_or(tick.now);
         approach.standing_since = reached.then_some(since);
         // A preload that flickers about its reference is still waited for by a wheel at rest.
         let moves = state.profile.speed() > Q16::ZERO;
-        approach.waiting = match (targets.waiting, moves) {
+        approach.waiting = match (waiting, moves) {
             (true, _) => approach.waiting + 1,
             (false, true) => 0,
             (false, false) => approach.waiting,
@@ -166,14 +165,11 @@ fn lead_time(open: &OpenCrossing, lifted_at: Tick) -> Seconds {
 mod tests {
     use super::super::tests::{sensed, within};
     use super::*;
-    use crate::model::approach::Begun;
     use crate::supervise::Leg;
 
     /// In motion on the first wall.
     fn running() -> State {
-        let mut state = State::default();
-        state.mode = Mode::Run(Direction::Deploy, Leg::Cruise);
-        state
+        State { mode: Mode::Run(Direction::Deploy, Leg::Cruise), ..State::default() }
     }
 
     #[test]
@@ -204,25 +200,17 @@ mod tests {
     #[test]
     fn a_preload_that_is_never_reached_is_a_fault_after_its_timeout() {
         let mut state = running();
-        let waiting = Targets {
-            speed: q16(1_000_000),
-            preload: q16(48_000_000),
-            ramping: true,
-            begun: Begun { looking: true, braking: true, released: false },
-            approaching: true,
-            waiting: true,
-        };
         within(&sensed(0, 0.0, 0.3), |controller, pass| {
-            let cross = waiting.preload;
+            let cross = q16(48_000_000);
             for tick in 0..controller.preload_timeout {
-                controller.note_preload(&mut state, pass, cross, &waiting);
+                controller.note_preload(&mut state, pass, cross, true);
                 controller.transit(&mut state, pass);
                 assert_eq!(state.mode, running().mode, "{tick}");
             }
             // Reported once.
             let wait = Event::Limit(Limit::PreloadWait);
             assert_eq!(pass.output.events.iter().filter(|e| e.event == wait).count(), 1);
-            controller.note_preload(&mut state, pass, cross, &waiting);
+            controller.note_preload(&mut state, pass, cross, true);
             controller.transit(&mut state, pass);
         });
         assert_eq!(state.mode, Mode::FaultHold(Fault::PreloadNotReached));
@@ -231,18 +219,9 @@ mod tests {
     #[test]
     fn a_preload_that_flickers_about_its_reference_is_a_fault_too() {
         let mut state = running();
-        let targets = |waiting: bool| Targets {
-            speed: Q16::ZERO,
-            preload: q16(48_000_000),
-            ramping: true,
-            begun: Begun::default(),
-            approaching: true,
-            waiting,
-        };
         within(&sensed(0, 0.0, 0.3), |controller, pass| {
             for tick in 0..=2 * controller.preload_timeout {
-                let targets = targets(tick % 2 == 0);
-                controller.note_preload(&mut state, pass, targets.preload, &targets);
+                controller.note_preload(&mut state, pass, q16(48_000_000), tick % 2 == 0);
                 controller.transit(&mut state, pass);
             }
         });

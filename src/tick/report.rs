@@ -9,7 +9,7 @@ use crate::model::planner::{KNOWN_SCALE, SHOWN_DEVIATION};
 use crate::model::{Learned, Review};
 use crate::numeric::part;
 use crate::supervise::{Leg, Mode};
-use crate::units::{Duty, MotorCommand, Q16, q16};
+use crate::units::{Q16, q16};
 
 use super::state::Approach;
 
@@ -112,7 +112,6 @@ impl Controller {
         tick: &TickContext<'_>,
         targets: &Targets,
     ) -> Telemetry {
-        let duty = |command: MotorCommand| if command.enable { command.duty } else { Duty::ZERO };
         let crossing = matches!(state.mode, Mode::Run(_, Leg::Crossing | Leg::Approach));
         let plan = state.planning.plan.as_ref();
         let learned = &state.planning.learned;
@@ -136,8 +135,8 @@ impl Controller {
             slip_margin: if crossing { planned.min(rolling) } else { rolling },
             vibration: state.vibration.peak(),
             distance: self.estimator.distance(&state.estimate).unwrap_or(Q16::MAX),
-            drive: duty(tick.output.drive),
-            pretightener: duty(tick.output.preload),
+            drive: tick.output.drive.duty,
+            pretightener: tick.output.preload.duty,
         }
     }
 }

@@ -43,15 +43,8 @@ impl Controller {
         if let Some(limit) = limit {
             tick.log(Event::Limit(limit));
         }
-        // A bridge without a duty stays off.
-        let command = |duty| match duty {
-            Duty::ZERO => MotorCommand::OFF,
-            duty => MotorCommand::on(duty),
-        };
-        let drive = match command(duties.drive) {
-            MotorCommand::OFF if state.service.brakes() => MotorCommand::on(Duty::ZERO),
-            drive => drive,
-        };
-        (drive, command(duties.pretightener))
+        // A bridge without a duty stays off, unless it brakes.
+        let command = |duty, brakes| MotorCommand { duty, enable: brakes || duty != Duty::ZERO };
+        (command(duties.drive, state.service.brakes()), command(duties.pretightener, false))
     }
 }

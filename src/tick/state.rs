@@ -38,7 +38,7 @@ pub struct State {
     pub(super) approach: Approach,
     pub(super) service: ServiceState,
     /// Ticks for which a corner has been detected, up to [`BLEND_TICKS`].
-    corner_blend_ticks: u8,
+    pub(super) corner_blend_ticks: u8,
 }
 
 /// The approach to the step ahead; it begins again with the next step and with each run.
@@ -112,18 +112,17 @@ impl State {
 
     /// Speed reference, signed outwards.
     pub(super) fn signed_speed(&self) -> MillimetresPerSecond {
-        match self.estimate.direction {
-            Direction::Deploy => self.profile.speed(),
-            Direction::Retract => -self.profile.speed(),
-        }
+        self.outwards(self.profile.speed())
     }
 
     /// Acceleration reference, signed outwards.
     pub(super) fn acceleration(&self) -> MillimetresPerSecond2 {
-        match self.estimate.direction {
-            Direction::Deploy => self.profile.acceleration(),
-            Direction::Retract => -self.profile.acceleration(),
-        }
+        self.outwards(self.profile.acceleration())
+    }
+
+    /// What is along the run, signed outwards.
+    fn outwards(&self, along: Q16) -> Q16 {
+        if self.estimate.direction == Direction::Deploy { along } else { -along }
     }
 
     /// Part of a corner's feed-forward that is blended in, 0 to 1, after one more tick, and what
@@ -169,7 +168,7 @@ impl State {
     /// Stops loops and profile where they are.
     pub(super) fn halt(&mut self) {
         self.profile.halt();
-        self.speed_loop.reset();
+        self.speed_loop = SpeedLoopState::default();
         self.preload_loop.halt();
     }
 }

@@ -2,11 +2,9 @@
 
 use super::drive::LEVEL_SLOPE;
 use super::*;
-use crate::control::schedule::Targets;
 use crate::estimate::ContactStage;
 use crate::estimate::crossing::Contact;
 pub(super) use crate::estimate::sensed;
-use crate::model::approach::Begun;
 use crate::rig::Rig;
 use crate::sense::Validity;
 use crate::sense::raw::{BridgeCode, BridgeCodes};
@@ -51,6 +49,13 @@ proptest! {
     }
 }
 
+/// Every sensor answers, and the wheel is at rest.
+pub(super) fn answering() -> SensedState {
+    let mut all = sensed(0, 0.0, 0.0);
+    all.validities_mut().into_iter().for_each(|validity| *validity = Validity::Valid);
+    all
+}
+
 /// Does something in a tick with these readings.
 pub(super) fn within<T>(
     sensed: &SensedState,
@@ -66,9 +71,8 @@ pub(super) fn within<T>(
 fn a_reset_right_after_a_fault_is_refused() {
     let idle = sensed(0, 0.0, 0.0);
     for (ticks, taken) in [(0, false), (50, false), (99, false), (100, true), (5000, true)] {
-        let mut state = State::default();
-        state.mode = Mode::FaultHold(Fault::TickOverrun);
-        state.in_mode = ticks;
+        let (mode, in_mode) = (Mode::FaultHold(Fault::TickOverrun), ticks);
+        let mut state = State { mode, in_mode, ..State::default() };
         let events = within(&idle, |controller, pass| {
             controller.take_command(&mut state, pass, Some(Command::Reset));
             pass.output.events.clone()
@@ -108,16 +112,7 @@ fn only_on_a_corner_the_climb_limits_the_speed() {
         state.estimate.watch.contact = contact;
         // Eight millimetres before the face at 18 mm.
         state.estimate.position = Q16::from_num(10);
-        let mut targets = Targets {
-            speed: fast,
-            preload: Q16::ZERO,
-            ramping: false,
-            begun: Begun { looking: true, ..Begun::default() },
-            approaching: false,
-            waiting: false,
-        };
-        stiff().limit_climb(&state, &mut targets);
-        targets.speed
+        stiff().limit_climb(&state, fast)
     };
     assert_eq!(limited(Contact::Wall), fast);
     assert!(limited(Contact::Both) < q16(30_000_000));
@@ -137,8 +132,8 @@ fn the_duty_shows_the_load_only_at_a_steady_speed() {
     };
     // At 20 mm/s, reached or accelerating to 30, with an effort far beyond its band.
     let found = |target: i32| {
-        let mut state = State::default();
-        state.mode = Mode::Run(Direction::Deploy, Leg::Cruise);
+        let mut state =
+            State { mode: Mode::Run(Direction::Deploy, Leg::Cruise), ..State::default() };
         let wanted = Q16::from_num(target);
         while state.profile.speed() < Q16::from_num(20) {
             controller.profile.step(&mut state.profile, wanted);
@@ -148,18 +143,11 @@ fn the_duty_shows_the_load_only_at_a_steady_speed() {
         }
         assert_eq!(state.profile.acceleration() == Q16::ZERO, target == 20);
         while state.speed_loop.value() < q16(200_000) {
-            controller.speed_loop.step(
-                &mut state.speed_loop,
-                Q16::from_num(20),
-                Q16::ZERO,
-                Q16::ZERO,
-            );
+            let (speed_loop, wanted) = (&mut state.speed_loop, Q16::from_num(20));
+            controller.speed_loop.step(speed_loop, wanted, Q16::ZERO, Q16::ZERO);
         }
         let speed = state.signed_speed();
-        let mut sensed = sensed(0, 0.0, 0.0);
-        let alive = [&mut sensed.speed, &mut sensed.preload, &mut sensed.compression];
-        alive.into_iter().for_each(|reading| reading.validity = Validity::Valid);
-        sensed.radius.validity = Validity::Valid;
+        let mut sensed = answering();
         sensed.speed.value = speed;
         (0..300).find_map(|now| {
             let mut output = Output::default();
