@@ -4,8 +4,6 @@
 
 #![deny(clippy::float_arithmetic)]
 
-use heapless::HistoryBuf;
-
 use super::monitor::lasts;
 use crate::fault::Fault;
 use crate::numeric::checked;
@@ -145,8 +143,10 @@ const fn run_of(changes: u16) -> u16 {
 pub(super) struct CrossState {
     /// Travel of the reference since the drive was switched on.
     reference: Travel,
-    /// Encoder less reference, mm, of the ticks of the last two spans, the oldest first.
-    past: HistoryBuf<Millimetres, { 2 * SPAN }>,
+    /// Encoder less reference, mm, of the ticks of the last two spans, the oldest first, and how many of
+    /// them are known.
+    past: [Millimetres; 2 * SPAN],
+    held: usize,
     at: Tick,
     /// Encoder and reference at the last progress.
     progress: (Travel, Travel),
@@ -287,16 +287,17 @@ impl CrossCheck {
         let missed = seen.read_at != seen.now || seen.now.wrapping_sub(state.at) != 1;
         state.at = seen.now;
         if missed {
-            state.past.clear();
+            state.held = 0;
             return false;
         }
         let now = Q16::narrow(seen.travel.wrapping_sub(state.reference));
-        let mut past = state.past.oldest_ordered().copied();
-        let spans = past.next().zip(past.nth(SPAN - 1)).filter(|_| state.past.is_full());
-        state.past.write(now);
-        spans.is_some_and(|(old, middle)| {
-            ((now - middle) - (middle - old)).abs() > self.bent || (now - old).abs() > self.off
-        })
+        let (old, middle) = (state.past[0], state.past[SPAN]);
+        let known = state.held >= state.past.len();
+        state.held = state.held.saturating_add(1);
+        state.past.rotate_left(1);
+        state.past[2 * SPAN - 1] = now;
+        let bend = (now - middle) - (middle - old);
+        known && (bend.abs() > self.bent || (now - old).abs() > self.off)
     }
 
     /// Whether the reference goes on while the wheel does not.
@@ -357,7 +358,8 @@ impl CrossState {
     /// Starts with the drive, which has been at rest until now.
     pub(super) fn begin(&mut self, seen: &Compared) {
         *self = Self {
-            past: HistoryBuf::new_with(Q16::narrow(seen.travel)),
+            past: [Q16::narrow(seen.travel); 2 * SPAN],
+            held: 2 * SPAN,
             at: seen.now.wrapping_sub(1),
             progress: (seen.travel, Travel::ZERO),
             strayed: self.strayed,

@@ -341,8 +341,7 @@ fn off_by_exactly_the_threshold_is_tolerated() {
     let drifts = |distance: Q16| {
         let mut past = [Q16::ZERO; 2 * SPAN];
         past[SPAN] = distance.half();
-        let mut state = CrossState::default();
-        state.past.extend(past);
+        let mut state = CrossState { past, held: 2 * SPAN, ..CrossState::default() };
         check.bends(&mut state, &off_by(1, distance))
     };
     let off = check.off;

@@ -137,9 +137,9 @@ fn the_task_that_hangs_is_named_whichever_it_is() {
 #[test]
 fn an_interrupt_that_never_ceases_ends_in_a_reset_that_names_the_starved_tick() {
     let mut board = Board::moving();
-    let at = board.position_mm();
     // Between two ticks.
     into_poll(&mut board, "journal", 300);
+    let at = board.position_mm();
     board.strike(Fault::ButtonStorm);
     let (cause, after, driven) = board.reset(150);
     assert_eq!(cause, Cause::Watchdog);
