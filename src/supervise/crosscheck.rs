@@ -4,7 +4,6 @@
 
 #![deny(clippy::float_arithmetic)]
 
-use super::monitor::lasts;
 use crate::fault::Fault;
 use crate::numeric::checked;
 use crate::rig::{Rig, RigError, SHORT_PART, START_LAG_MM};
@@ -352,6 +351,12 @@ fn judge(state: &mut CodeState, value: Q16, due: Newtons, limits: &Limits) -> bo
         state.erratic.saturating_sub(1)
     };
     state.same >= limits.stuck || sleeps || state.erratic >= ERRATIC
+}
+
+/// Counts ticks while a condition lasts, and whether they are `enough`.
+pub(super) fn lasts(count: &mut u16, condition: bool, enough: u16) -> bool {
+    *count = if condition { count.saturating_add(1) } else { 0 };
+    *count >= enough
 }
 
 impl CrossState {

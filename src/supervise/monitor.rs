@@ -3,7 +3,7 @@
 #![deny(clippy::float_arithmetic)]
 
 use super::Mode;
-use super::crosscheck::{Compared, CrossCheck, CrossState, Noise};
+use super::crosscheck::{Compared, CrossCheck, CrossState, Noise, lasts};
 use super::readback::{Readback, ReadbackState};
 use crate::control::preload_loop::answer_s;
 use crate::fault::Fault;
@@ -194,12 +194,6 @@ impl MonitorState {
     pub fn set_duties(&mut self, drive: Duty, pretightener: Duty) {
         self.readback.set_duties(drive, pretightener);
     }
-}
-
-/// Counts ticks while a condition lasts, and whether they are `enough`.
-pub(super) fn lasts(count: &mut u16, condition: bool, enough: u16) -> bool {
-    *count = if condition { count.saturating_add(1) } else { 0 };
-    *count >= enough
 }
 
 /// The fault of a sensor that cannot be used any more.
