@@ -335,6 +335,25 @@ fn across_a_missing_reading_no_distance_is_judged() {
 }
 
 #[test]
+fn of_what_shows_in_one_tick_the_arm_is_named_before_the_wheel_that_stands() {
+    let (check, state) = rested();
+    let seen = off_by(state.at.wrapping_add(1), Q16::ZERO);
+    // Its reference has gone on by 20 mm, and the arm by 1 mm.
+    let ahead = Travel::from_num(20);
+    let stands = CrossState {
+        reference: ahead,
+        past: [Q16::narrow(seen.travel.wrapping_sub(ahead)); 2 * SPAN],
+        progress: (seen.travel, Travel::ZERO),
+        ..state
+    };
+    let moves = |by: i32| (seen.radius - Q16::from_num(by), seen.travel);
+    for (by, named) in [(0, Fault::DriveStalled), (1, Fault::ArmMismatch)] {
+        let mut state = CrossState { arm: moves(by), arm_ticks: 10, ..stands.clone() };
+        assert_eq!(check.step(&mut state, &Noise::default(), &seen), Some(named));
+    }
+}
+
+#[test]
 fn off_by_exactly_the_threshold_is_tolerated() {
     let check = CrossCheck::try_build(&Rig::prototype()).expect("a sound rig");
     // Steadily away from the reference: half of the distance in each span.
