@@ -4,12 +4,11 @@
 
 use std::path::{Path, PathBuf};
 
-use interstage::log::Record;
-use interstage::sense::raw::SensorFrame;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use super::{Controller, Header, MODE_NAMES, STAGE_NAMES, TrueState};
+use super::write::write_row;
+use super::{Header, MODE_NAMES, STAGE_NAMES, Tick};
 use crate::files::{FileError, write_text};
 
 /// What a table has no place for.
@@ -62,34 +61,22 @@ pub fn write_metadata(
 
 /// The columns in their order, as a CSV writer derives it.
 fn columns(with_truth: bool) -> Vec<Value> {
-    let of = |row: &dyn Fn(&mut csv::Writer<Vec<u8>>) -> csv::Result<()>| {
-        let mut table = csv::Writer::from_writer(Vec::new());
-        // Numbers and texts always have a form.
-        let written = row(&mut table).ok().and_then(|()| table.into_inner().ok());
-        let text = String::from_utf8(written.unwrap_or_default()).unwrap_or_default();
-        text.lines().next().unwrap_or_default().split(',').map(str::to_owned).collect::<Vec<_>>()
-    };
-    let controller = Controller::of(&Record::default(), &SensorFrame::default());
-    let mut names = of(&|table| table.serialize(controller));
-    let mut examples = json!(controller);
-    if with_truth {
-        names.extend(of(&|table| table.serialize(TrueState::default())));
-        if let (Some(all), Value::Object(truth)) =
-            (examples.as_object_mut(), json!(TrueState::default()))
-        {
-            all.extend(truth);
-        }
-    }
-    let one = |name: String| match name.as_str() {
+    let example = Tick::example(with_truth);
+    let mut table = csv::Writer::from_writer(Vec::new());
+    // Numbers and texts always have a form.
+    let written = write_row(&mut table, &example).ok().and_then(|()| table.into_inner().ok());
+    let text = String::from_utf8(written.unwrap_or_default()).unwrap_or_default();
+    let examples = json!(example);
+    let one = |name: &str| match name {
         "mode" => json!({ "name": name, "datatype": words(&MODE_NAMES) }),
         "stage" => json!({ "name": name, "datatype": words(&STAGE_NAMES) }),
         _ => {
             // A code or its time is absent in the example.
-            let whole = examples[&name].is_null() || examples[&name].is_u64();
+            let whole = examples[name].is_null() || examples[name].is_u64();
             json!({ "name": name, "datatype": if whole { "integer" } else { "number" } })
         }
     };
-    names.into_iter().map(one).collect()
+    text.lines().next().unwrap_or_default().split(',').map(one).collect()
 }
 
 /// A column that takes these words.

@@ -14,7 +14,7 @@ use serde_json::{Map, Value, json};
 
 use super::{
     Controller, CrossingLine, Decoder, Item, LedgerLine, MODE_NAMES, Recording, STAGE_NAMES,
-    Summary, Tick, TrueState, pieces, text,
+    Summary, Tick, pieces, text,
 };
 use crate::files::{Failure, FileError, atomic_write};
 
@@ -36,7 +36,7 @@ fn field(number: u8, bytes: &[u8]) -> Vec<u8> {
 }
 
 /// A frame as message `interstage.Frame { bytes data = 1; }`.
-fn wrapped(frame: &[u8]) -> Vec<u8> {
+pub(super) fn wrapped(frame: &[u8]) -> Vec<u8> {
     field(1, frame)
 }
 
@@ -99,12 +99,8 @@ impl Topic {
     pub(crate) fn schema(self) -> Value {
         match self {
             Self::Tick => {
-                let controller = Controller::of(
-                    &interstage::log::Record::default(),
-                    &interstage::sense::raw::SensorFrame::default(),
-                );
-                let tick = Tick { controller, truth: Some(TrueState::default()) };
-                let mut schema = flat_schema("interstage.Tick", &tick, &["tick", "t_s", "mode"]);
+                let (tick, required) = (Tick::example(true), ["tick", "t_s", "mode"]);
+                let mut schema = flat_schema("interstage.Tick", &tick, &required);
                 enumerate(&mut schema, "mode", &MODE_NAMES);
                 enumerate(&mut schema, "stage", &STAGE_NAMES);
                 schema
@@ -145,8 +141,13 @@ fn body(topic: Topic, message: &impl Serialize) -> Option<(Topic, Vec<u8>)> {
     bytes(message).ok().map(|bytes| (topic, bytes))
 }
 
+/// `message` as a JSON object without the fields that have no value.
 fn bytes(message: &impl Serialize) -> serde_json::Result<Vec<u8>> {
-    serde_json::to_vec(&object(message)?)
+    let mut value = serde_json::to_value(message)?;
+    if let Value::Object(fields) = &mut value {
+        fields.retain(|_, field| !field.is_null());
+    }
+    serde_json::to_vec(&value)
 }
 
 fn level(entry: &Entry) -> u8 {
@@ -177,14 +178,14 @@ impl<W: Write + Seek> McapFile<W> {
     pub(super) fn metadata(
         &mut self,
         name: &str,
-        pairs: impl IntoIterator<Item = (String, String)>,
+        pairs: impl IntoIterator<Item = (impl Into<String>, String)>,
     ) -> Result<(), Failure> {
-        let metadata = pairs.into_iter().collect();
+        let metadata = pairs.into_iter().map(|(key, value)| (key.into(), value)).collect();
         Ok(self.out.write_metadata(&Metadata { name: name.to_owned(), metadata })?)
     }
 
     pub(super) fn parameters(&mut self, toml: &str) -> Result<(), Failure> {
-        self.metadata("parameters", [("toml".to_owned(), toml.to_owned())])
+        self.metadata("parameters", [("toml", toml.to_owned())])
     }
 
     /// Adds a message at a time since boot, ns. A topic's first message adds its channel.
@@ -213,11 +214,6 @@ impl<W: Write + Seek> McapFile<W> {
         Ok(self.out.add_channel(schema, topic.name(), encoding, &BTreeMap::new())?)
     }
 
-    /// Adds a frame.
-    pub(super) fn frame(&mut self, ns: u64, frame: &[u8]) -> Result<(), Failure> {
-        self.message(ns, Topic::Frames, &wrapped(frame))
-    }
-
     /// Passes everything to the system as complete chunks.
     pub(super) fn flush(&mut self) -> Result<(), Failure> {
         Ok(self.out.flush()?)
@@ -236,8 +232,18 @@ impl<W: Write + Seek> McapFile<W> {
 pub fn write_mcap(recording: &Recording, path: &Path) -> Result<(), FileError> {
     atomic_write(path, |out| {
         let mut file = McapFile::new(out)?;
-        let ticks = ("ticks".to_owned(), recording.rows.len().to_string());
-        file.metadata("run", about(&recording.summary).into_iter().chain([ticks]))?;
+        let summary = &recording.summary;
+        let about = [
+            ("version", env!("CARGO_PKG_VERSION").to_owned()),
+            ("target", summary.target.clone()),
+            ("controller", summary.controller.clone()),
+            ("direction", summary.direction.clone()),
+            ("rig", summary.rig.clone()),
+            ("seed", summary.seed.to_string()),
+            ("trace_digest", summary.trace_digest.clone()),
+            ("ticks", recording.rows.len().to_string()),
+        ];
+        file.metadata("run", about)?;
         file.parameters(&recording.parameters)?;
         let mut all = Vec::new();
         for tick in &recording.rows {
@@ -247,7 +253,7 @@ pub fn write_mcap(recording: &Recording, path: &Path) -> Result<(), FileError> {
             let message = log_message(nanoseconds(line.t_s), INFO, &line.text);
             all.push((line.t_s, Topic::Log, bytes(&message)?));
         }
-        for line in &recording.summary.crossings {
+        for line in &summary.crossings {
             all.push((line.lift_s, Topic::Crossing, bytes(line)?));
         }
         // A frame is of the time of the newest tick up to it.
@@ -265,37 +271,15 @@ pub fn write_mcap(recording: &Recording, path: &Path) -> Result<(), FileError> {
         for (t_s, topic, body) in &all {
             file.message(nanoseconds(*t_s), *topic, body)?;
         }
-        let last = all.last().map_or(recording.summary.total_s, |(t_s, ..)| *t_s);
-        file.message(nanoseconds(last), Topic::Summary, &bytes(&recording.summary)?)?;
+        let last = all.last().map_or(summary.total_s, |(t_s, ..)| *t_s);
+        file.message(nanoseconds(last), Topic::Summary, &bytes(summary)?)?;
         file.finish()
     })
-}
-
-fn about(summary: &Summary) -> [(String, String); 7] {
-    [
-        ("version", env!("CARGO_PKG_VERSION").to_owned()),
-        ("target", summary.target.clone()),
-        ("controller", summary.controller.clone()),
-        ("direction", summary.direction.clone()),
-        ("rig", summary.rig.clone()),
-        ("seed", summary.seed.to_string()),
-        ("trace_digest", summary.trace_digest.clone()),
-    ]
-    .map(|(key, value)| (key.to_owned(), value))
 }
 
 /// Time since boot, ns; 0 for times before boot.
 fn nanoseconds(t_s: f64) -> u64 {
     (t_s * 1e9).round() as u64
-}
-
-/// `message` as a JSON object without the fields that have no value.
-fn object(message: &impl Serialize) -> serde_json::Result<Value> {
-    let mut value = serde_json::to_value(message)?;
-    if let Value::Object(fields) = &mut value {
-        fields.retain(|_, field| !field.is_null());
-    }
-    Ok(value)
 }
 
 /// A JSON schema named `title` of flat objects like `example`. Fields outside `required` may
@@ -360,6 +344,8 @@ fn kind(value: &Value) -> &'static str {
 mod tests {
     use super::*;
     use crate::report::example;
+    use crate::scenario::Scenario;
+    use crate::session;
 
     #[test]
     fn messages_and_metadata_are_read_back_in_order_of_time() {
@@ -407,10 +393,8 @@ mod tests {
             let frame: Vec<u8> = (0..length).map(|i| (i * 7 % 251) as u8).collect();
             assert_eq!(unwrapped(&wrapped(&frame)), frame, "{length}");
         }
-        let (options, rows) = (crate::session::Options::default(), true);
-        let options = crate::session::Options { rows, ..options };
-        let stream = crate::session::run(&crate::scenario::Scenario::default(), options).unwrap();
-        assert!(pieces(&stream.stream).all(|frame| unwrapped(frame) == frame));
+        let recording = session::run(&Scenario::default(), session::Options::ROWS).unwrap();
+        assert!(pieces(&recording.stream).all(|frame| unwrapped(frame) == frame));
     }
 
     #[test]

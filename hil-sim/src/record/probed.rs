@@ -86,19 +86,15 @@ mod tests {
 
     use super::*;
     use crate::probe::script::{Next, open};
-    use crate::record::{Mark, Run, Virtual, Writer};
+    use crate::record::{Mark, Run, Writer};
     use crate::replay::replay;
     use crate::scenario::Scenario;
+    use crate::session;
     use interstage::rig::Rig;
 
     /// The frames of a run in software, as a board would send them.
     fn sent() -> Vec<u8> {
-        let mut source = Virtual::new(&Scenario::default(), false).unwrap();
-        let mut bytes = Vec::new();
-        while let Some(part) = source.read().unwrap() {
-            bytes.extend(part);
-        }
-        bytes
+        session::run(&Scenario::default(), session::Options::ROWS).unwrap().stream
     }
 
     /// Sends a letter, then captures what the polls of the channel return; empty polls after

@@ -13,7 +13,7 @@ use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 /// First bytes of an MCAP file.
 pub(super) const MCAP: &[u8] = b"\x89MCAP";
 /// First bytes of a CSV file of rows.
-const CSV: &[u8] = b"tick,";
+pub(super) const CSV: &[u8] = b"tick,";
 
 /// A log that cannot be read; displays as one line with its path.
 #[derive(Debug, thiserror::Error)]
@@ -100,11 +100,6 @@ const LONGEST_RECORD: usize = 1 << 26;
 
 /// Largest ratio of a chunk's content to its size in the file: the limit of LZ4.
 const EXPANSION: u64 = 256;
-
-/// Whether the first bytes are those of a table.
-pub(super) fn is_table(bytes: &[u8]) -> bool {
-    bytes.starts_with(CSV)
-}
 
 /// The file up to the first record whose length cannot be true: longer than the rest of the
 /// file, or a chunk larger than LZ4 can expand to. The reader would allocate that length. And
@@ -233,16 +228,17 @@ fn of_csv(bytes: &[u8], metadata: TableMetadata) -> Result<Run, String> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
 
     use crate::record::decoder::tests::frames;
 
-    fn file(bytes: &[u8]) -> (tempfile::TempDir, PathBuf) {
+    /// Reads a file of these bytes.
+    pub(crate) fn read(bytes: &[u8]) -> Result<Run, ReadError> {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("log");
         std::fs::write(&path, bytes).unwrap();
-        (directory, path)
+        Run::read(&path)
     }
 
     #[test]
@@ -269,8 +265,7 @@ mod tests {
 
     #[test]
     fn the_bytes_of_the_channel_are_a_log() {
-        let (_directory, path) = file(&frames(0, 80).concat());
-        let run = Run::read(&path).unwrap();
+        let run = read(&frames(0, 80).concat()).unwrap();
         assert_eq!(run.rows.len(), 80);
         assert!(run.is_complete());
         assert_eq!(run.header.unwrap().rig, "test");
@@ -294,14 +289,12 @@ mod tests {
             csv.serialize(row).unwrap();
         }
         let bytes = csv.into_inner().unwrap();
-        let (_directory, path) = file(&bytes);
-        assert_eq!(Run::read(&path).unwrap().rows, run.rows);
-        assert_eq!(Run::read(&path).unwrap().cut, None);
+        let intact = read(&bytes).unwrap();
+        assert_eq!((intact.rows, intact.cut), (run.rows.clone(), None));
         for lacks in [1, 40] {
-            let (_directory, path) = file(&bytes[..bytes.len() - lacks]);
-            let read = Run::read(&path).unwrap();
-            assert_eq!(read.rows, run.rows[..79], "without its last {lacks} bytes");
-            let cut = read.cut.expect("it is noticed");
+            let short = read(&bytes[..bytes.len() - lacks]).unwrap();
+            assert_eq!(short.rows, run.rows[..79], "without its last {lacks} bytes");
+            let cut = short.cut.expect("it is noticed");
             assert_eq!((cut.at_s, cut.missing_ticks), (run.rows[78].t_s, None));
         }
     }
@@ -309,12 +302,11 @@ mod tests {
     #[test]
     fn what_is_no_log_is_refused_in_one_line() {
         for bytes in [&b""[..], b"hello", b"\x89MCAP0\r\n", &[7; 900]] {
-            let (_directory, path) = file(bytes);
-            let error = Run::read(&path).unwrap_err().to_string();
+            let error = read(bytes).unwrap_err().to_string();
             assert!(error.contains("no log") && error.lines().count() == 1, "{error}");
         }
-        let (_directory, path) = file(b"tick,t_s,mode,preload_sensor_code\n1,0.001,0,7\n");
-        let error = Run::read(&path).unwrap_err().to_string();
+        let table = b"tick,t_s,mode,preload_sensor_code\n1,0.001,0,7\n";
+        let error = read(table).unwrap_err().to_string();
         assert!(error.contains("it lacks the column arm_angle_at"), "{error}");
         let missing = Run::read(Path::new("/nowhere/log.mcap")).unwrap_err();
         assert!(matches!(missing, ReadError::File(..)));

@@ -316,19 +316,20 @@ fn drawn(plant: &PlantParameters, scenario: &Scenario) -> Map<String, Value> {
 mod tests {
     use super::*;
 
-    fn truth(preload_n: f64, separation_mm: f64) -> Truth {
-        let scenario = Scenario::resolve(Some("prototype"), None, &[]).expect("a scenario");
+    fn at_rest() -> (Scenario, VirtualRig) {
+        let scenario = Scenario::default();
         let plant = VirtualRig::new(scenario.plant(), 0.0, 0.0, TICK_S);
-        Truth { preload_n, separation_mm, ..*plant.truth() }
+        (scenario, plant)
     }
 
     #[test]
     fn only_ticks_under_way_count() {
         let mut recorder = RunRecorder::new(2.5, 0.0);
-        for (moves, preload, separation) in
-            [(false, 90.0, 9.0), (true, 30.0, 0.1), (true, 40.0, 0.3), (false, 90.0, 9.0)]
+        let (_, plant) = at_rest();
+        for (mode, preload_n, separation_mm) in
+            [(3, 90.0, 9.0), (5, 30.0, 0.1), (5, 40.0, 0.3), (3, 90.0, 9.0)]
         {
-            recorder.close_tick(if moves { 5 } else { 3 }, &truth(preload, separation));
+            recorder.close_tick(mode, &Truth { preload_n, separation_mm, ..*plant.truth() });
         }
         assert_eq!((recorder.run_started, recorder.run_ended), (Some(1e-3), 2e-3));
         assert_eq!((recorder.preload_sum, recorder.moving), (70.0, 2));
@@ -338,8 +339,7 @@ mod tests {
     #[test]
     fn the_duration_counts_from_the_last_command_before_the_motion() {
         let durations = |moves: bool, commands: &[usize]| {
-            let scenario = Scenario::default();
-            let plant = VirtualRig::new(scenario.plant(), 0.0, 0.0, TICK_S);
+            let (scenario, plant) = at_rest();
             let mut recorder = RunRecorder::new(2.5, 0.0);
             for tick in 0..10 {
                 if commands.contains(&tick) {
@@ -359,7 +359,7 @@ mod tests {
 
     #[test]
     fn arriving_takes_the_place_and_every_step() {
-        let scenario = Scenario::resolve(Some("prototype"), None, &[]).expect("a scenario");
+        let scenario = Scenario::default();
         let end = scenario.rig.rig.travel_mm;
         let plant = VirtualRig::new(scenario.plant(), end, 33.3, TICK_S);
         let finish = |arrived| {
@@ -373,8 +373,7 @@ mod tests {
 
     #[test]
     fn a_run_that_is_cut_off_says_so() {
-        let scenario = Scenario::default();
-        let plant = VirtualRig::new(scenario.plant(), 0.0, 0.0, TICK_S);
+        let (scenario, plant) = at_rest();
         let cut_off = |passed| {
             let recorder = RunRecorder { passed, ..RunRecorder::new(2.5, 0.0) };
             recorder.finish("sil", &scenario, &plant, None, 1.0).summary

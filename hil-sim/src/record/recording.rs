@@ -11,21 +11,20 @@ use interstage::model::Planner;
 use interstage::model::plan::PLAN_TICKS;
 use interstage::supervise::Mode;
 use interstage::tick::Event;
-use interstage::units;
 use mcap::records::Record;
 use serde_json::Value;
 
-use super::read::{MCAP, ReadError, content, is_table, parameters, records};
+use super::read::{CSV, MCAP, ReadError, content, parameters, records};
 use super::recorder::{restart_words, text};
 use super::time_lost::{TimeLost, TimeSplit};
 use super::{Controller, CrossingLine, LedgerLine, LogLine, Recording, Run, Summary, Tick};
-use crate::scenario::Scenario;
+use crate::scenario::{Direction, Scenario};
 use crate::table::counted;
 
 /// Reads the recordings of any log: of each start of the target, as its clock begins anew there.
 pub fn recordings(path: &Path) -> Result<Vec<Recording>, ReadError> {
     let bytes = content(path)?;
-    if is_table(&bytes) {
+    if bytes.starts_with(CSV) {
         return Err(ReadError::Table(path.display().to_string()));
     }
     let mut strange = Vec::new();
@@ -91,7 +90,8 @@ fn boots(run: &Run) -> Vec<Recording> {
 
 /// The recording of a start of the target: what the controller measured.
 fn measured(run: &Run) -> Recording {
-    let mut summary = summary(run);
+    let scenario = run.scenario(&[]).ok();
+    let mut summary = summary(run, scenario.as_ref());
     let mut log = Vec::new();
     for entry in &run.events {
         let t_s = f64::from(entry.at) * 1e-3;
@@ -108,7 +108,7 @@ fn measured(run: &Run) -> Recording {
     summary.completed |= later.is_some_and(|(_, mode)| matches!(mode, Mode::Complete(_)));
     summary.completed &= summary.faults.is_empty();
     summary.crossings = run.ledger.iter().map(|line| crossing(run, line)).collect();
-    let mut levels = run.rows.iter().filter(|row| row.mode().is_some_and(Mode::moves));
+    let mut levels = run.rows.iter().filter(moves);
     let levels = levels.next().zip(levels.next_back());
     let passed = levels.map_or(0, |(first, last)| usize::from(first.level.abs_diff(last.level)));
     if passed > summary.crossings.len() {
@@ -122,9 +122,8 @@ fn measured(run: &Run) -> Recording {
         summary.slip_mm = summary.crossings.iter().map(|line| line.slip_mm).sum();
     }
     let rows = run.rows.iter().map(|row| Tick { controller: *row, truth: None }).collect();
-    let parameters = run
-        .scenario(&[])
-        .map_or_else(|_| run.parameters.clone().unwrap_or_default(), |scenario| scenario.to_toml());
+    let parameters = scenario
+        .map_or_else(|| run.parameters.clone().unwrap_or_default(), |known| known.to_toml());
     Recording { summary, rows, log, parameters, ..Recording::default() }
 }
 
@@ -142,35 +141,38 @@ fn commanded(run: &Run) -> Option<u32> {
     None
 }
 
+fn moves(row: &&Controller) -> bool {
+    row.mode().is_some_and(Mode::moves)
+}
+
+/// Whether the log ends with the drive at its end of travel.
+fn arrived(run: &Run) -> bool {
+    let last = run.rows.last().and_then(Controller::mode);
+    last.is_some_and(|mode| matches!(mode, Mode::Complete(_)))
+}
+
 /// Where the time of a run that arrived goes, by the controller's position.
 fn lost(run: &Run, scenario: Option<&Scenario>) -> Option<TimeLost> {
-    let arrived = run.rows.last()?.mode().is_some_and(|mode| matches!(mode, Mode::Complete(_)));
-    let cruise_mm_s =
-        scenario.filter(|_| arrived && commanded(run).is_some())?.rig.drive.cruise_speed_mm_s;
+    let known = scenario.filter(|_| arrived(run) && commanded(run).is_some())?;
     let mut split = TimeSplit::default();
     run.rows.iter().for_each(|row| split.add(row.t_s, row.mode, row.position_mm));
-    Some(split.lost(cruise_mm_s))
+    Some(split.lost(known.rig.drive.cruise_speed_mm_s))
 }
 
 /// A run as the controller reports it.
-fn summary(run: &Run) -> Summary {
-    let moves = |row: &&Controller| row.mode().is_some_and(Mode::moves);
-    let (first, last) = (run.rows.iter().find(moves), run.rows.iter().rfind(moves));
-    let retracts = first.is_some_and(|row| row.retracts);
+fn summary(run: &Run, scenario: Option<&Scenario>) -> Summary {
     let moving: Vec<&Controller> = run.rows.iter().filter(moves).collect();
-    let preload: f64 = moving.iter().map(|row| row.preload_n).sum();
-    let between = |of: fn(&Controller) -> f64| match (first, last) {
-        (Some(first), Some(last)) => of(last) - of(first),
-        _ => 0.0,
+    let (first, last) = (moving.first(), moving.last());
+    let between = |of: fn(&Controller) -> f64| {
+        first.zip(last).map_or(0.0, |(first, last)| of(last) - of(first))
     };
+    let retracts = first.is_some_and(|row| row.retracts);
+    let direction = if retracts { Direction::Retract } else { Direction::Deploy };
+    let preload: f64 = moving.iter().map(|row| row.preload_n).sum();
     let header = run.header.clone().unwrap_or_default();
-    let scenario = run.scenario(&[]).ok();
-    let direction = if retracts { units::Direction::Retract } else { units::Direction::Deploy };
     // The reference that this controller planned for.
-    let gap_ref = scenario.as_ref().and_then(|scenario| {
-        let planner = Planner::try_build(&scenario.rig).ok()?;
-        Some(planner.gap_ref(direction).to_num())
-    });
+    let planner = scenario.and_then(|scenario| Planner::try_build(&scenario.rig).ok());
+    let gap_ref_mm = planner.map(|planner| planner.gap_ref(direction.into()).to_num());
     // A host's build has no hash.
     let has_hash = header.build.bytes().any(|digit| digit != b'0');
     let build = if has_hash { format!(", build {}", header.build) } else { String::new() };
@@ -179,27 +181,20 @@ fn summary(run: &Run) -> Summary {
         measured: true,
         missing: run.missing(),
         version: env!("CARGO_PKG_VERSION").to_owned(),
-        overrides: scenario.as_ref().map(Scenario::overrides).unwrap_or_default(),
-        seed: scenario.as_ref().map_or(0, |scenario| scenario.run.seed),
-        completed: run
-            .rows
-            .last()
-            .and_then(Controller::mode)
-            .is_some_and(|mode| matches!(mode, Mode::Complete(_))),
+        overrides: scenario.map(Scenario::overrides).unwrap_or_default(),
+        seed: scenario.map_or(0, |scenario| scenario.run.seed),
+        completed: arrived(run),
         target: format!("log of version {}{build}", header.version),
-        controller: scenario
-            .as_ref()
-            .map_or("unknown", |scenario| scenario.run.controller.name())
-            .to_owned(),
-        direction: if retracts { "retract" } else { "deploy" }.to_owned(),
+        controller: scenario.map_or("unknown", |known| known.run.controller.name()).to_owned(),
+        direction: direction.name().to_owned(),
         rig: header.rig,
         commanded_s: commanded(run).map(|at| 1e-3 * f64::from(at)),
         duration_s: last.zip(commanded(run)).map(|(row, at)| row.t_s - 1e-3 * f64::from(at)),
-        lost: lost(run, scenario.as_ref()),
+        lost: lost(run, scenario),
         moving_s: between(|row| row.t_s),
         total_s: run.rows.last().map_or(0.0, |row| row.t_s),
         travel_mm: between(|row| row.position_mm).abs(),
-        gap_ref_mm: gap_ref.unwrap_or(unknown),
+        gap_ref_mm: gap_ref_mm.unwrap_or(unknown),
         max_gap_mm: unknown,
         slip_mm: unknown,
         mean_preload_n: preload / moving.len() as f64,

@@ -89,6 +89,7 @@ pub enum Unknown {
 /// Numbers of items before a start of the target.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Boot {
+    pub rows: usize,
     pub events: usize,
     pub plans: usize,
     pub requests: usize,
@@ -98,6 +99,7 @@ pub struct Boot {
 /// Items from one start of the target to the next.
 #[derive(Clone, Copy, Debug)]
 pub struct Since<'a> {
+    pub rows: &'a [Controller],
     pub events: &'a [Entry],
     /// Plans with the ticks that received them.
     pub plans: &'a [(u32, Plan)],
@@ -222,6 +224,7 @@ impl Run {
         let from = from.copied().unwrap_or_default();
         let to = self.boots.get(boot).copied().unwrap_or_else(|| self.end());
         Since {
+            rows: self.rows.get(from.rows..to.rows).unwrap_or_default(),
             events: self.events.get(from.events..to.events).unwrap_or_default(),
             plans: self.plans.get(from.plans..to.plans).unwrap_or_default(),
             requests: self.requests.get(from.requests..to.requests).unwrap_or_default(),
@@ -232,15 +235,13 @@ impl Run {
     /// Rows, events and ledger of each start of the target, on its own clock. What is missing is
     /// counted in the last.
     pub fn by_boot(&self) -> Vec<Self> {
-        let restarts = self.marks.iter().filter(|(_, mark)| *mark == Mark::Restart);
-        let ends: Vec<usize> = restarts.map(|(row, _)| *row).chain([self.rows.len()]).collect();
-        let boot = |(place, end): (usize, &usize)| {
-            let from = place.checked_sub(1).map_or(0, |before| ends[before]);
-            let Since { events, ledger, .. } = self.since_boot(place);
-            let is_last = place + 1 == ends.len();
+        let last = self.boots.len();
+        let boot = |place: usize| {
+            let Since { rows, events, ledger, .. } = self.since_boot(place);
+            let is_last = place == last;
             Self {
                 header: self.header.clone(),
-                rows: self.rows[from..*end].to_vec(),
+                rows: rows.to_vec(),
                 events: events.to_vec(),
                 ledger: ledger.to_vec(),
                 counts: if is_last { self.counts } else { Counts::default() },
@@ -249,12 +250,13 @@ impl Run {
                 ..Self::default()
             }
         };
-        ends.iter().enumerate().map(boot).collect()
+        (0..=last).map(boot).collect()
     }
 
     /// What has come so far.
     fn end(&self) -> Boot {
         Boot {
+            rows: self.rows.len(),
             events: self.events.len(),
             plans: self.plans.len(),
             requests: self.requests.len(),

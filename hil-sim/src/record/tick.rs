@@ -205,26 +205,24 @@ const DUTY: f64 = 32_768.0;
 impl Controller {
     /// A tick that did not run, or is not in the log.
     pub fn unknown(tick: u32) -> Self {
-        let unknown = f64::NAN;
-        let nothing = Self::of(&Record::default(), &SensorFrame::default());
         Self {
             tick,
             t_s: f64::from(tick) * 1e-3,
             mode: OFF,
-            position_mm: unknown,
-            wheel_speed_mm_s: unknown,
-            speed_ref_mm_s: unknown,
-            preload_n: unknown,
-            preload_ref_n: unknown,
-            compression_mm: unknown,
-            radius_mm: unknown,
-            gap_predicted_mm: unknown,
-            slip_margin: unknown,
-            vibration_mm: unknown,
+            position_mm: f64::NAN,
+            wheel_speed_mm_s: f64::NAN,
+            speed_ref_mm_s: f64::NAN,
+            preload_n: f64::NAN,
+            preload_ref_n: f64::NAN,
+            compression_mm: f64::NAN,
+            radius_mm: f64::NAN,
+            gap_predicted_mm: f64::NAN,
+            slip_margin: f64::NAN,
+            vibration_mm: f64::NAN,
             distance_mm: None,
-            drive_duty: unknown,
-            pretightener_duty: unknown,
-            ..nothing
+            drive_duty: f64::NAN,
+            pretightener_duty: f64::NAN,
+            ..Tick::example(false).controller
         }
     }
 
@@ -318,10 +316,9 @@ impl Controller {
     pub fn telemetry(&self) -> Option<Telemetry> {
         let q = |value: f64| (!value.is_nan()).then(|| Q16::from_num(value));
         let duty = |value: f64| Duty::from_bits((value * DUTY).round() as i16);
-        let mode = self.mode()?;
         Some(Telemetry {
             at: self.tick,
-            mode,
+            mode: self.mode()?,
             stage: codes::stage(self.stage)?,
             position: q(self.position_mm)?,
             speed: q(self.wheel_speed_mm_s)?,
@@ -359,8 +356,7 @@ pub struct TrueState {
     /// Largest tread compression, mm.
     #[serde(default = "nan")]
     pub compression_true_mm: f64,
-    /// Clearance between the root of the nearest step and the undeformed wheel
-    /// circle, mm; NaN away from a step.
+    /// Clearance of the nearest step's root from the undeformed wheel, mm; NaN away from a step.
     #[serde(default = "nan")]
     pub root_clearance_mm: f64,
     /// Force of the step's corner and face on the wheel, N.
@@ -403,6 +399,12 @@ impl From<&Truth> for TrueState {
 }
 
 impl Tick {
+    /// A tick of zeros, which shows the form of each column.
+    pub(super) fn example(with_truth: bool) -> Self {
+        let controller = Controller::of(&Record::default(), &SensorFrame::default());
+        Self { controller, truth: with_truth.then(TrueState::default) }
+    }
+
     /// A true quantity; `NaN` without truth.
     pub fn of_truth(&self, of: impl Fn(&TrueState) -> f64) -> f64 {
         self.truth.as_ref().map_or(f64::NAN, of)
@@ -468,13 +470,12 @@ mod tests {
 
     #[test]
     fn of_an_unknown_tick_only_the_time_is_a_number() {
-        let columns = |tick: &Controller| serde_json::to_value(tick).unwrap();
-        let known = columns(&Controller::of(&Record::default(), &SensorFrame::default()));
-        let unknown = columns(&Controller::unknown(5));
+        let columns = |tick: Controller| serde_json::to_value(tick).unwrap();
+        let known = columns(Tick::example(false).controller);
+        let unknown = columns(Controller::unknown(5));
         let numbers = known.as_object().unwrap().iter().filter(|(_, value)| value.is_f64());
-        let names: Vec<&String> = numbers.map(|(name, _)| name).collect();
-        assert!(names.len() > Telemetry::QUANTITIES, "{names:?}");
-        for name in names {
+        assert!(numbers.clone().count() > Telemetry::QUANTITIES, "{known}");
+        for (name, _) in numbers {
             assert_eq!(unknown[name].is_null(), name != "t_s", "{name}");
         }
     }

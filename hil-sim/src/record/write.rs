@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use interstage::log::frame::LONGEST;
 
 use super::csv_file::{Metadata, write_metadata};
-use super::mcap_file::{McapFile, TICK_NS};
+use super::mcap_file::{McapFile, TICK_NS, wrapped};
 use super::tick::OFF;
 use super::{
     Controller, Counts, Decoder, Header, Item, Mark, Recording, Run, Tick, Topic, messages, pieces,
@@ -35,7 +35,7 @@ pub struct WriteError {
 
 /// Adds a row. Reading gives the same bits; what is unknown is `NaN`. Without truth its
 /// columns are absent.
-fn write_row<W: Write>(csv: &mut csv::Writer<W>, tick: &Tick) -> csv::Result<()> {
+pub(super) fn write_row<W: Write>(csv: &mut csv::Writer<W>, tick: &Tick) -> csv::Result<()> {
     match tick.truth {
         Some(truth) => csv.serialize((tick.controller, truth)),
         None => csv.serialize(tick.controller),
@@ -172,7 +172,7 @@ impl<M: Write + Seek, C: Write> Writer<M, C> {
         self.decoder.read(frame, &mut |item| items.push(item));
         self.items(&items, see)?;
         if let Some(mcap) = &mut self.mcap {
-            mcap.frame(self.now, frame)?;
+            mcap.message(self.now, Topic::Frames, &wrapped(frame))?;
         }
         Ok(())
     }
@@ -243,6 +243,7 @@ mod tests {
     use std::sync::{Arc, Mutex};
 
     use super::*;
+    use crate::record::read::tests::read;
     use crate::record::{Run, Summary};
     use crate::report::example;
     use crate::scenario::Scenario;
@@ -287,16 +288,9 @@ mod tests {
         session::run(&Scenario::default(), session::Options::ROWS).unwrap().stream
     }
 
-    fn read(bytes: &[u8]) -> Run {
-        let directory = tempfile::tempdir().unwrap();
-        let path = directory.path().join("log");
-        std::fs::write(&path, bytes).unwrap();
-        Run::read(&path).unwrap()
-    }
-
-    /// Writes the stream in pieces to disks of these sizes.
-    fn write(stream: &[u8], disks: (&Disk, &Disk)) -> Result<Counts, WriteError> {
-        let (mcap, csv) = (Some(disks.0.clone()), Some(disks.1.clone()));
+    /// Writes the stream in pieces to an MCAP file and a table on these disks.
+    fn write(stream: &[u8], [mcap, csv]: &[Disk; 2]) -> Result<Counts, WriteError> {
+        let (mcap, csv) = (Some(mcap.clone()), Some(csv.clone()));
         let mut writer = Writer::new(mcap, csv, Some("[run]\nseed = 0\n"), true)?;
         for part in stream.chunks(777) {
             writer.take(part, &mut |_| {})?;
@@ -304,12 +298,17 @@ mod tests {
         writer.finish(&mut |_| {})
     }
 
+    /// The same on disks that are never full: what was counted, and the files.
+    fn written(stream: &[u8]) -> (Counts, [Vec<u8>; 2]) {
+        let disks = [Disk::of(u64::MAX), Disk::of(u64::MAX)];
+        (write(stream, &disks).unwrap(), disks.map(|disk| disk.content()))
+    }
+
     #[test]
     fn both_files_give_back_what_came() {
-        let (stream, disks) = (stream(), (Disk::of(u64::MAX), Disk::of(u64::MAX)));
-        let counts = write(&stream, (&disks.0, &disks.1)).unwrap();
-        let (run, mcap, csv) =
-            (Run::of_stream(&stream), read(&disks.0.content()), read(&disks.1.content()));
+        let (counts, files) = written(&stream());
+        let (run, [mcap, csv]) =
+            (Run::of_stream(&stream()), files.map(|file| read(&file).unwrap()));
         assert_eq!(counts, run.counts);
         assert_eq!(csv.rows, run.rows);
         assert_eq!(mcap.parameters.as_deref(), Some("[run]\nseed = 0\n"));
@@ -321,13 +320,13 @@ mod tests {
     fn a_full_disk_is_reported_and_what_was_written_stays_readable() {
         let stream = stream();
         for (mcap, csv) in [(400_000, u64::MAX), (u64::MAX, 500_000)] {
-            let disks = (Disk::of(mcap), Disk::of(csv));
-            let error = write(&stream, (&disks.0, &disks.1)).unwrap_err();
+            let disks = [Disk::of(mcap), Disk::of(csv)];
+            let error = write(&stream, &disks).unwrap_err();
             let text = error.to_string();
             assert!(text.contains("no storage space") && text.lines().count() == 1, "{text}");
             assert!(error.kept >= 1000 && error.kept <= error.ticks, "{error}");
-            for disk in [&disks.0, &disks.1] {
-                let run = read(&disk.content());
+            for disk in disks {
+                let run = read(&disk.content()).unwrap();
                 assert!(run.rows.len() as u64 >= error.kept, "{} rows", run.rows.len());
                 assert!(run.rows.windows(2).all(|pair| pair[1].tick == pair[0].tick + 1));
             }
@@ -336,12 +335,10 @@ mod tests {
 
     #[test]
     fn a_file_cut_anywhere_is_read_up_to_there() {
-        let (stream, disks) = (stream(), (Disk::of(u64::MAX), Disk::of(u64::MAX)));
-        write(&stream, (&disks.0, &disks.1)).unwrap();
-        let file = disks.0.content();
+        let (_, [file, _]) = written(&stream());
         let mut before = 0;
         for tenth in 4..10 {
-            let run = read(&file[..file.len() * tenth / 10]);
+            let run = read(&file[..file.len() * tenth / 10]).unwrap();
             let rows = run.rows.len();
             let cut = run.cut.expect("it is noticed");
             assert_eq!((cut.at_s, cut.missing_ticks), (run.rows[rows - 1].t_s, None));
@@ -353,11 +350,8 @@ mod tests {
 
     #[test]
     fn time_in_the_file_never_goes_back_even_if_the_target_restarts() {
-        let disks = (Disk::of(u64::MAX), Disk::of(u64::MAX));
-        let twice = [stream(), stream()].concat();
-        let counts = write(&twice, (&disks.0, &disks.1)).unwrap();
+        let (counts, [content, _]) = written(&[stream(), stream()].concat());
         assert_eq!(counts.restarts, 1);
-        let content = disks.0.content();
         let mut last = 0;
         for message in mcap::MessageStream::new(&content).unwrap() {
             let message = message.unwrap();
