@@ -159,12 +159,6 @@ fn helped_elsewhere(arguments: &[OsString]) -> Option<&'static str> {
     arguments.iter().any(is_help).then_some(verb)
 }
 
-/// Prints why a verb could not do its work.
-fn failed(failure: &Failure) -> ExitCode {
-    output::complain(&format!("error: {failure}"));
-    failure.code()
-}
-
 /// Parses the arguments of this process and runs the verb. Errors are one line.
 pub fn run<C: Parser>(run: impl FnOnce(&C) -> Result<Outcome, Failure>) -> ExitCode {
     let cli = match C::try_parse() {
@@ -177,7 +171,10 @@ pub fn run<C: Parser>(run: impl FnOnce(&C) -> Result<Outcome, Failure>) -> ExitC
         Failure::Elsewhere(part) => Ok(Outcome::Code(provision::go_on(part)?)),
         failure => Err(failure),
     });
-    outcome.map_or_else(|failure| failed(&failure), Outcome::code)
+    outcome.map(Outcome::code).unwrap_or_else(|failure| {
+        output::complain(&format!("error: {failure}"));
+        failure.code()
+    })
 }
 
 #[cfg(test)]

@@ -7,11 +7,12 @@ use serde::Serialize;
 
 use super::failure::{Failure, Outcome};
 use super::output;
+use super::params::scenario_of;
 use crate::bringup::{self, Check, Line, Operator, Progress, Stdin};
 use crate::files::{make_directory, write_text};
 use crate::probe::Port;
 use crate::provision::Extra;
-use crate::scenario::{PRESETS, Scenario};
+use crate::scenario::Scenario;
 
 /// Checks the wiring of a rig at its first power-up, stage by stage.
 ///
@@ -102,10 +103,7 @@ pub fn carry_out(
             ));
         }
         (Ok(_), Some(given)) => given,
-        (Ok(held), None) => {
-            let preset = PRESETS.iter().find(|preset| **preset == held.name);
-            Scenario::of_rig(preset.unwrap_or(&PRESETS[0]), held.rig)
-        }
+        (Ok(held), None) => scenario_of(&held),
         (Err(crate::params::StoreError::Silent { .. }), given) => given.unwrap_or_default(),
         (Err(error), _) => return Err(Failure::run(error)),
     };
@@ -140,10 +138,7 @@ pub fn carry_out(
 
 fn human(progress: &Progress) -> String {
     let failed: Vec<&Check> = progress.checks().filter(|check| !check.ok).collect();
-    let mut text = match failed.len() {
-        0 => "every check passed\n".to_owned(),
-        _ => String::new(),
-    };
+    let mut text = if failed.is_empty() { "every check passed\n" } else { "" }.to_owned();
     for check in failed {
         text += &format!("{}: {}\n  {}\n", check.name, check.measured, check.advice);
     }

@@ -54,7 +54,7 @@ pub(super) struct Part {
     /// Version of this program.
     version: String,
     /// The command, without what concerns the part and its output.
-    command: Vec<String>,
+    pub(super) command: Vec<String>,
     /// The scenario, TOML.
     parameters: String,
     /// Cases of the complete campaign.
@@ -90,11 +90,6 @@ impl Part {
             all.lines.extend(part.lines);
         }
         all.ok_or_else(|| Failure::input("expected the files of the parts"))
-    }
-
-    /// The command that the parts belong to.
-    pub(super) fn command(&self) -> &[String] {
-        &self.command
     }
 }
 
@@ -178,10 +173,8 @@ impl CampaignArgs {
         };
         let (done, of) = (lines.len(), places.len());
         if done == 0 {
-            return Err(Failure::run(format!(
-                "interrupted before the first of {}",
-                counted(of, "case")
-            )));
+            let cases = counted(of, "case");
+            return Err(Failure::run(format!("interrupted before the first of {cases}")));
         }
         // One machine reads its lines as `rig merge` does, so that both print the same.
         let read = |(at, line): &(usize, Value)| L::deserialize(line).map(|line| (*at, line));

@@ -158,10 +158,7 @@ fn directory(args: &Args, scenario: &Scenario) -> Result<PathBuf, Failure> {
         Path::new("out").join(format!("{direction}-{rig}-{controller}-{seed}{board}{tag}"))
     });
     // Reported before the run, not after it.
-    if directory.exists() && !directory.is_dir() {
-        let path = directory.display();
-        return Err(Failure::input(format!("--out {path}: exists and is not a directory")));
-    }
+    output::no_file(&directory)?;
     Ok(directory)
 }
 

@@ -57,10 +57,7 @@ struct Printed<'a> {
 pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     args.run.without("controller", "every strategy has its map")?;
     let scenario = args.run.resolve()?;
-    if args.out.exists() && !args.out.is_dir() {
-        let path = args.out.display();
-        return Err(Failure::input(format!("--out {path}: exists and is not a directory")));
-    }
+    output::no_file(&args.out)?;
     let campaign = envelope::campaign(&scenario, args.grid)?;
     let carried_out = args.campaign.carry_out(scenario.to_toml(), campaign)?;
     let found = &carried_out.outcome;

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use interstage::log::identity::fingerprint;
-use serde_json::{Value, json};
+use serde_json::json;
 
 use super::failure::Failure;
 use crate::files::make_directory;
@@ -47,10 +47,9 @@ pub(super) struct LogFiles {
     csv: Option<PathBuf>,
     /// What the target is said to run with: hash and TOML.
     given: (String, String),
-    /// The target's identity, as soon as it has come.
-    header: Option<Header>,
-    /// What it runs with, if that is what was given.
-    parameters: Option<String>,
+    /// The target's identity, as soon as it has come, and what it runs with, if that is what was
+    /// given.
+    metadata: Metadata,
     news: Vec<String>,
 }
 
@@ -76,8 +75,7 @@ impl LogFiles {
             mcap,
             csv,
             given,
-            header: None,
-            parameters: None,
+            metadata: Metadata::default(),
             news: Vec::new(),
         })
     }
@@ -94,39 +92,31 @@ impl LogFiles {
         see: &mut impl FnMut(&Item),
     ) -> Result<(), Failure> {
         self.writer.take(bytes, see).map_err(|error| failed(&self.folder, error))?;
-        if self.writer.header().is_some() && self.header.as_ref() != self.writer.header() {
-            self.header = self.writer.header().cloned();
-            self.identified()?;
+        match self.writer.header() {
+            Some(header) if self.metadata.header.as_ref() != Some(header) => {
+                self.identified(header.clone())
+            }
+            _ => Ok(()),
         }
-        Ok(())
     }
 
     /// The target has said what it runs with: parameters that have its hash belong to the log.
-    fn identified(&mut self) -> Result<(), Failure> {
+    fn identified(&mut self, header: Header) -> Result<(), Failure> {
         let (hash, toml) = &self.given;
-        match &self.header {
-            Some(header) if header.parameters == *hash => {
-                let written = self.writer.parameters(toml);
-                written.map_err(|error| failed(&self.folder, error))?;
-                self.parameters = Some(toml.clone());
-            }
-            Some(header) => self.news.push(format!(
+        if header.parameters == *hash {
+            let written = self.writer.parameters(toml);
+            written.map_err(|error| failed(&self.folder, error))?;
+            self.metadata.parameters = Some(toml.clone());
+        } else {
+            self.news.push(format!(
                 "the target runs with parameters {}, those given are {hash}: the log has none \
                  (`rig params save FILE` writes a board's; give that file)",
                 header.parameters
-            )),
-            None => {}
+            ));
         }
+        self.metadata.header = Some(header);
         // The number of ticks follows at the end.
-        let metadata = Metadata {
-            header: self.header.clone(),
-            parameters: self.parameters.clone(),
-            ..Metadata::default()
-        };
-        self.csv.as_ref().map_or(Ok(()), |csv| {
-            write_metadata(csv, &metadata, false)?;
-            Ok(())
-        })
+        describe(self.csv.as_deref(), &self.metadata).map(drop)
     }
 
     /// What has been read so far.
@@ -144,18 +134,21 @@ impl LogFiles {
         self,
         see: &mut impl FnMut(&Item),
     ) -> Result<(Counts, Vec<PathBuf>), Failure> {
-        let Self { writer, folder, mcap, csv, header, parameters, .. } = self;
+        let Self { writer, folder, mcap, csv, mut metadata, .. } = self;
         let counts = writer.finish(see).map_err(|error| failed(&folder, error))?;
         let starts = csv.as_ref().and_then(|_| recordings(&mcap).ok()).unwrap_or_default();
-        let crossings = match &starts[..] {
-            [start] => json!(start.summary.crossings),
-            _ => Value::Null,
-        };
-        let metadata = Metadata { header, parameters, ticks: Some(counts.ticks), crossings };
-        let described =
-            csv.as_ref().map(|csv| write_metadata(csv, &metadata, false)).transpose()?;
+        if let [start] = &starts[..] {
+            metadata.crossings = json!(start.summary.crossings);
+        }
+        metadata.ticks = Some(counts.ticks);
+        let described = describe(csv.as_deref(), &metadata)?;
         Ok((counts, [Some(mcap), csv, described].into_iter().flatten().collect()))
     }
+}
+
+/// Writes the metadata of the table, if there is one; their path.
+fn describe(csv: Option<&Path>, metadata: &Metadata) -> Result<Option<PathBuf>, Failure> {
+    Ok(csv.map(|csv| write_metadata(csv, metadata, false)).transpose()?)
 }
 
 fn failed(folder: &Path, error: WriteError) -> Failure {

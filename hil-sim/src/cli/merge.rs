@@ -25,10 +25,10 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     let part = Part::merged(&args.parts)?;
-    let words = std::iter::once("rig").chain(part.command().iter().map(String::as_str));
+    let words = std::iter::once("rig").chain(part.command.iter().map(String::as_str));
     let mut cli = Cli::try_parse_from(words)
         .map_err(|error| Failure::input(parse::line(&error.to_string())))?;
-    let command = part.command().join(" ");
+    let command = part.command.join(" ");
     let campaign = cli.verb.campaign();
     let campaign = campaign.ok_or_else(|| Failure::input(format!("`{command}`: no campaign")))?;
     *campaign = CampaignArgs::of_parts(args.show.clone(), part);

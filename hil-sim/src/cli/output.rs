@@ -57,6 +57,15 @@ pub(super) fn spare(name: &str, to: &Path, inputs: &[&Path]) -> Result<(), Failu
     Ok(())
 }
 
+/// Refuses a folder `out` for the files where a file is.
+pub(super) fn no_file(out: &Path) -> Result<(), Failure> {
+    if out.exists() && !out.is_dir() {
+        let out = out.display();
+        return Err(Failure::input(format!("--out {out}: exists and is not a directory")));
+    }
+    Ok(())
+}
+
 /// Refuses to write to a file of another ending.
 pub(super) fn ends_in(name: &str, to: &Path, ending: &str) -> Result<(), Failure> {
     let why = || format!("{name} {}: expected a name that ends in .{ending}", to.display());

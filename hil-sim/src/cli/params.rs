@@ -183,7 +183,7 @@ fn replace(
 }
 
 /// The scenario of a held rig; one whose name is no preset is compared with the prototype.
-fn scenario_of(held: &Held) -> Scenario {
+pub(super) fn scenario_of(held: &Held) -> Scenario {
     let preset = PRESETS.iter().find(|preset| **preset == held.name).unwrap_or(&PRESETS[0]);
     Scenario::of_rig(preset, held.rig.clone())
 }

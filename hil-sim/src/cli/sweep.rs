@@ -2,7 +2,6 @@
 
 use std::path::{Path, PathBuf};
 
-use interstage::units;
 use serde_json::{Map, Value, json};
 
 use super::campaign::CampaignArgs;
@@ -13,7 +12,7 @@ use super::scenario::RunArgs;
 use crate::campaign::{AS_GIVEN, Campaign, Column, Frame, column};
 use crate::files::{make_directory, vacant, vacant_for, write_text};
 use crate::rollout::CrossingSetup;
-use crate::scenario::{Direction, Scenario};
+use crate::scenario::Scenario;
 use crate::session::{self, Options};
 use crate::sweep::{self, Axis, MOST, Plot};
 
@@ -65,10 +64,7 @@ pub(super) struct Args {
 type Row = Map<String, Value>;
 
 /// What is found at each place, and what of it is plotted.
-struct Measure {
-    columns: &'static [Column],
-    plots: Vec<Plot>,
-}
+type Measure = (&'static [Column], &'static [Plot]);
 
 pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     if args.crossing {
@@ -83,7 +79,12 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
         .iter()
         .map(|place| Point::of(args, &base, &axes, place))
         .collect::<Result<_, _>>()?;
-    let measure = if args.crossing { of_crossing(args.driven) } else { of_run() };
+    let measure = match (args.crossing, args.driven) {
+        (false, _) => RUN,
+        (true, true) => CROSSING,
+        // The friction comes last.
+        (true, false) => (&CROSSING.0[..4], &CROSSING.1[..2]),
+    };
     let campaign = Campaign {
         steps: (if args.crossing { "crossings" } else { "runs" }, 1),
         cases: points.iter().zip(&places).collect(),
@@ -100,9 +101,9 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
         name: key.replace('.', ".\n").into(),
         ..column("", "", "", AS_GIVEN)
     });
-    let columns: Vec<Column> = keys.chain(measure.columns.iter().cloned()).collect();
+    let columns: Vec<Column> = keys.chain(measure.0.iter().cloned()).collect();
     let (rows, table) = (&found.outcome, Frame::of(&columns, &found.outcome));
-    let write = || write(args, &axes, rows, &table.csv(), &measure);
+    let write = || write(args, &axes, rows, &table.csv(), measure.1);
     let files = if args.no_files { Vec::new() } else { write()? };
     let printed = json!({ "rows": rows, "files": files });
     let text = || table.text(&["gap_over_ref", "faults"]) + &output::wrote(&files);
@@ -165,10 +166,7 @@ impl Point {
         let setup = CrossingSetup {
             speed_mm_s: given(SPEED, scenario.rig.control.safe_speed_mm_s)?,
             preload_n: given(PRELOAD, scenario.rig.preload.cruise_n)?,
-            direction: match scenario.run.direction {
-                Direction::Deploy => units::Direction::Deploy,
-                Direction::Retract => units::Direction::Retract,
-            },
+            direction: scenario.run.direction.into(),
             load_n: args.driven.then_some(loads.top_load_n * loads.top_load_share),
         };
         check(&setup, ["--key speed_mm_s", "--key preload_n"])?;
@@ -200,47 +198,43 @@ const fn plot(column: &'static str, title: &'static str, y_name: &'static str) -
     Plot { column, title, y_name }
 }
 
-fn of_run() -> Measure {
-    const COLUMNS: &[Column] = &[
+const RUN: Measure = (
+    &[
         column("completed", "completed", "", 0),
         column("max_gap_mm", "worst gap", "mm", 3),
         column("gap_over_ref", "over\nreference", "", 4),
         column("duration_s", "duration", "s", 2),
         column("slip_mm", "slip", "mm", 3),
         column("faults", "faults", "", 0),
-    ];
-    let plots = vec![
+    ],
+    &[
         plot("max_gap_mm", "Worst gap", "gap, mm"),
         plot("duration_s", "Duration from the command", "duration, s"),
         plot("slip_mm", "Gross slip", "slip, mm"),
-    ];
-    Measure { columns: COLUMNS, plots }
-}
+    ],
+);
 
-fn of_crossing(is_driven: bool) -> Measure {
-    const COLUMNS: &[Column] = &[
+const CROSSING: Measure = (
+    &[
         column("gap_mm", "gap", "mm", 3),
         column("corner_force_n", "corner", "N", 2),
         column("embedding_mm", "embedding", "mm", 3),
         column("climb_work_mj", "work", "mJ", 1),
         column("mu_needed", "friction\nneeded", "", 3),
-    ];
-    let mut plots = vec![
+    ],
+    &[
         plot("gap_mm", "Gap of the crossing", "gap, mm"),
         plot("corner_force_n", "Corner force", "force, N"),
-    ];
-    if is_driven {
-        plots.push(plot("mu_needed", "Friction needed", "friction"));
-    }
-    Measure { columns: if is_driven { COLUMNS } else { &COLUMNS[..4] }, plots }
-}
+        plot("mu_needed", "Friction needed", "friction"),
+    ],
+);
 
 fn write(
     args: &Args,
     axes: &[Axis],
     rows: &[Row],
     table: &str,
-    measure: &Measure,
+    plots: &[Plot],
 ) -> Result<Vec<PathBuf>, Failure> {
     let keys: Vec<&str> = axes.iter().map(|axis| &*axis.key).collect();
     let what = if args.crossing { "crossing" } else { "deploy" };
@@ -253,7 +247,7 @@ fn write(
     make_directory(&directory)?;
     let mut files = vec![file(&directory)];
     write_text(&files[0], table)?;
-    if let Some(picture) = sweep::picture(axes, rows, &measure.plots) {
+    if let Some(picture) = sweep::picture(axes, rows, plots) {
         files.push(directory.join("sweep.svg"));
         write_text(&files[1], &picture)?;
     }

@@ -22,7 +22,9 @@ pub fn run(summary: &Summary, files: &[PathBuf], all: bool) -> String {
     for missing in &summary.missing {
         text += &wrapped(&format!("incomplete log: {missing}"), "  ", WIDTH);
     }
-    text += &wrapped(&details(summary), "  ", WIDTH);
+    let speed = (!summary.measured)
+        .then(|| format!("simulated at {:.0} times real time", summary.real_time_factor));
+    text += &wrapped(&details(summary, speed), "  ", WIDTH);
     if !summary.crossings.is_empty() {
         text += &format!("{}\n", ledger(&summary.crossings, all));
     }
@@ -43,10 +45,8 @@ pub fn run(summary: &Summary, files: &[PathBuf], all: bool) -> String {
 /// One of two runs that are compared, by its letter and its log: outcome, verdict and origin.
 pub fn one_of_two(letter: char, log: &str, summary: &Summary) -> String {
     let headline = wrapped(&format!("{letter}: {}", headline(summary)), "", WIDTH);
-    let mut parts = vec![verdict(summary), gap_sentence(summary), slip_sentence(summary)];
-    parts.extend([origin(summary), log.to_owned()]);
-    parts.retain(|part| !part.is_empty());
-    painted(&headline, Grade::of(summary), is_coloured()) + &wrapped(&parts.join("; "), "  ", WIDTH)
+    painted(&headline, Grade::of(summary), is_coloured())
+        + &wrapped(&details(summary, Some(log.to_owned())), "  ", WIDTH)
 }
 
 /// Whether standard output shows colours: a terminal, unless `NO_COLOR` is set.
@@ -62,13 +62,10 @@ fn painted(text: &str, grade: Grade, is_coloured: bool) -> String {
     text.lines().map(|line| format!("\u{1b}[{}m{line}\u{1b}[0m\n", grade.ansi())).collect()
 }
 
-fn details(s: &Summary) -> String {
-    let mut parts = vec![verdict(s), gap_sentence(s), slip_sentence(s), origin(s)];
-    parts.retain(|part| !part.is_empty());
-    if !s.measured {
-        parts.push(format!("simulated at {:.0} times real time", s.real_time_factor));
-    }
-    parts.join("; ")
+/// Verdict, gap, slip and origin as far as there is something to say, and what is given.
+fn details(s: &Summary, more: Option<String>) -> String {
+    let parts = [verdict(s), gap_sentence(s), slip_sentence(s), origin(s)].into_iter().chain(more);
+    parts.filter(|part| !part.is_empty()).collect::<Vec<_>>().join("; ")
 }
 
 /// A row a crossing; with `all` quantities a row each.
