@@ -72,9 +72,7 @@ impl Kind {
             Self::Number => format!("a number{unit}"),
             Self::Integer => "a whole number, 0 or more".to_owned(),
             Self::Numbers(most) => format!("a list of at most {most} numbers{unit}"),
-            Self::Word(words) => {
-                words.iter().map(|w| format!("\"{w}\"")).collect::<Vec<_>>().join(" or ")
-            }
+            Self::Word(words) => one_of(words),
             Self::Anomalies => {
                 "a list such as [{ kind = \"late\", step = 2, offset_mm = 1.0 }]".to_owned()
             }
@@ -84,6 +82,11 @@ impl Kind {
             }
         }
     }
+}
+
+/// Half a sentence: one of these words.
+pub(super) fn one_of(words: &[impl std::fmt::Display]) -> String {
+    words.iter().map(|word| format!("\"{word}\"")).collect::<Vec<_>>().join(" or ")
 }
 
 /// Units by the end of a key, the longer ends first.

@@ -9,7 +9,7 @@ use toml::{Table, Value};
 
 use super::ScenarioError;
 use super::injection::{self, CATALOGUE, HARDWARE};
-use super::keys::{self, Kind, nearest_word};
+use super::keys::{self, Kind, nearest_word, one_of};
 use super::run::StepAnomaly;
 
 /// Origin of what `--set` overrides.
@@ -295,26 +295,21 @@ impl Entry<'_> {
 
     /// Takes one of these words, which must be there.
     fn word(&mut self, name: &str, known: Vec<String>) -> Result<String, ScenarioError> {
-        match self.given.get(name) {
-            Some(Value::String(word)) if known.contains(word) => {
-                self.found.insert(name.to_owned(), Value::String(word.clone()));
-                Ok(word.clone())
-            }
-            other => {
-                let found = other.map_or_else(|| "nothing".to_owned(), Value::to_string);
-                let near =
-                    other.and_then(Value::as_str).and_then(|word| nearest_word(word, &known));
-                if let Some(near) = near {
-                    let what = format!(
-                        "{} = {found}: no such {name}, did you mean \"{near}\"?",
-                        self.key(name)
-                    );
-                    return Err(ScenarioError::at(self.origin, what));
-                }
-                let known: Vec<String> = known.iter().map(|word| format!("\"{word}\"")).collect();
-                Err(self.wrong(name, &found, &known.join(" or ")))
-            }
+        let all = self.given;
+        let given = all.get(name);
+        let word = given.and_then(Value::as_str);
+        if let Some(word) = word.filter(|word| known.iter().any(|one| one == word)) {
+            self.found.insert(name.to_owned(), word.into());
+            return Ok(word.to_owned());
         }
+        let found = given.map_or_else(|| "nothing".to_owned(), Value::to_string);
+        Err(match word.and_then(|word| nearest_word(word, &known)) {
+            Some(near) => {
+                let why = format!("no such {name}, did you mean \"{near}\"?");
+                ScenarioError::at(self.origin, format!("{} = {found}: {why}", self.key(name)))
+            }
+            None => self.wrong(name, &found, &one_of(&known)),
+        })
     }
 
     /// Refuses every other key than these.
