@@ -5,7 +5,9 @@ use std::process::Output;
 
 use serde_json::Value;
 
-use super::{code, good, number, object, refused, refused_in, rig, rig_in, stderr, stdout};
+use super::{
+    code, good, good_in, number, object, refused, refused_in, rig, rig_in, stderr, stdout,
+};
 
 fn campaign(more: &[&str]) -> Value {
     good(&[&["montecarlo", "--json"], more].concat())
@@ -119,9 +121,7 @@ fn the_comparison_has_every_strategy_and_the_oracle() {
 #[test]
 fn the_envelope_writes_its_picture_and_every_key() {
     let directory = tempfile::tempdir().unwrap();
-    let output = rig_in(directory.path(), &["envelope", "-n", "2x2", "--json"]);
-    assert_eq!(code(&output), 0);
-    let found = object(&output);
+    let found = object(&good_in(directory.path(), &["envelope", "-n", "2x2", "--json"]));
     let grid = found["grid"].as_array().unwrap();
     assert_eq!(grid.len(), 2 * 2 * 2 * 4);
     for cell in grid {

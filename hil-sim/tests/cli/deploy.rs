@@ -4,41 +4,21 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use super::{code, is_empty, json, number, object, rig, rig_in, stdout};
+use super::{ends_with, good_in, is_empty, json, number, object, stdout};
 
 /// Keys of the summary that others rely on.
-const KEYS: [&str; 13] = [
-    "completed",
-    "target",
-    "controller",
-    "seed",
-    "duration_s",
-    "moving_s",
-    "travel_mm",
-    "max_gap_mm",
-    "slip_mm",
-    "faults",
-    "real_time_factor",
-    "trace_digest",
-    "crossings",
-];
+const KEYS: &str = "completed target controller seed duration_s moving_s travel_mm max_gap_mm \
+    slip_mm faults real_time_factor trace_digest crossings";
 
 /// The same of each crossing.
-const CROSSING_KEYS: [&str; 10] = [
-    "index",
-    "speed_mm_s",
-    "preload_n",
-    "gap_mm",
-    "gap_predicted_mm",
-    "gap_measured_mm",
-    "corner_force_n",
-    "lead_time_s",
-    "limited_by",
-    "slip_mm",
-];
+const CROSSING_KEYS: &str = "index speed_mm_s preload_n gap_mm gap_predicted_mm gap_measured_mm \
+    corner_force_n lead_time_s limited_by slip_mm";
 
-fn assert_keys(value: &Value, keys: &[&str]) {
-    for key in keys {
+/// The files of a run.
+const FILES: &str = "report.html log.mcap log.csv log.csv-metadata.json summary.json overview.svg";
+
+fn assert_keys(value: &Value, keys: &str) {
+    for key in keys.split_whitespace() {
         assert!(value.get(key).is_some(), "{key} is missing in {value}");
     }
 }
@@ -46,29 +26,20 @@ fn assert_keys(value: &Value, keys: &[&str]) {
 #[test]
 fn writes_its_files_and_prints_every_key() {
     let directory = tempfile::tempdir().unwrap();
-    let output = rig_in(directory.path(), &["deploy", "--json"]);
-    assert_eq!(code(&output), 0);
-    let summary = object(&output);
-    assert_keys(&summary, &KEYS);
+    let summary = object(&good_in(directory.path(), &["deploy", "--json"]));
+    assert_keys(&summary, KEYS);
     assert_eq!(summary["completed"], true);
     assert_eq!((&summary["target"], &summary["seed"]), (&Value::from("sil"), &Value::from(0)));
     let crossings = summary["crossings"].as_array().unwrap();
     assert_eq!(crossings.len(), 3);
     assert!(number(&summary, "duration_s") > number(&summary, "moving_s"));
     for crossing in crossings {
-        assert_keys(crossing, &CROSSING_KEYS);
+        assert_keys(crossing, CROSSING_KEYS);
     }
     let files = summary["files"].as_array().unwrap();
     assert_eq!(files.len(), 6);
     let run = Path::new("out/deploy-prototype-scheduled-0");
-    for name in [
-        "report.html",
-        "log.mcap",
-        "log.csv",
-        "log.csv-metadata.json",
-        "summary.json",
-        "overview.svg",
-    ] {
+    for name in FILES.split(' ') {
         let file = run.join(name);
         assert!(files.contains(&Value::from(file.to_str().unwrap())), "{name}");
         assert!(directory.path().join(&file).metadata().unwrap().len() > 100, "{name}");
@@ -80,8 +51,7 @@ fn writes_its_files_and_prints_every_key() {
 #[test]
 fn files_go_to_the_given_directory_and_a_table_is_printed() {
     let directory = tempfile::tempdir().unwrap();
-    let output = rig_in(directory.path(), &["deploy", "--out", "mine/run"]);
-    assert_eq!(code(&output), 0);
+    let output = good_in(directory.path(), &["deploy", "--out", "mine/run"]);
     let text = stdout(&output);
     assert!(text.starts_with("Deployed ") && text.contains("  good: every gap "), "{text}");
     assert!(text.contains("  wrote mine/run/:\n    report.html, log.csv, "), "{text}");
@@ -93,10 +63,9 @@ fn files_go_to_the_given_directory_and_a_table_is_printed() {
 #[test]
 fn a_retraction_without_files_completes_and_writes_nothing() {
     let directory = tempfile::tempdir().unwrap();
-    let output = rig_in(directory.path(), &["deploy", "--retract", "--no-files", "--json"]);
-    assert_eq!(code(&output), 0);
-    let summary = object(&output);
-    assert_keys(&summary, &KEYS);
+    let summary =
+        object(&good_in(directory.path(), &["deploy", "--retract", "--no-files", "--json"]));
+    assert_keys(&summary, KEYS);
     assert_eq!((&summary["direction"], &summary["completed"]), (&"retract".into(), &true.into()));
     assert_eq!(summary["files"], serde_json::json!([]));
     let steps = summary["crossings"].as_array().unwrap().iter().map(|c| c["index"].as_i64());
@@ -110,9 +79,7 @@ fn a_scenario_file_is_taken_in_either_place() {
     let path = directory.path().join("bench.toml");
     std::fs::write(&path, "[run]\nseed = 5\ncontroller = \"limit\"\n").unwrap();
     let run = |arguments: &[&str]| {
-        let output = rig_in(directory.path(), &[&["deploy", "--json"], arguments].concat());
-        assert_eq!(code(&output), 0);
-        object(&output)
+        object(&good_in(directory.path(), &[&["deploy", "--json"], arguments].concat()))
     };
     let named = run(&["--scenario", "bench.toml", "--no-files"]);
     assert_eq!((&named["seed"], &named["controller"]), (&Value::from(5), &Value::from("limit")));
@@ -125,7 +92,6 @@ fn a_scenario_file_is_taken_in_either_place() {
 fn a_run_that_does_not_complete_ends_with_one() {
     // On ice no controller climbs.
     let arguments = ["deploy", "--no-files", "--json", "--set", "plant.mu=0.05"];
-    let output = rig(&arguments);
-    assert_eq!(code(&output), 1);
-    assert_eq!(object(&output)["completed"], false);
+    let directory = tempfile::tempdir().unwrap();
+    assert_eq!(object(&ends_with(1, directory.path(), &arguments))["completed"], false);
 }

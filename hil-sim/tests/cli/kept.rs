@@ -1,16 +1,10 @@
 //! A run's files say what the run was, and no run takes another one's place unasked.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use serde_json::Value;
 
-use super::{code, json, number, object, refused_in, rig_in, stderr, stdout};
-
-pub(crate) fn good(at: &Path, arguments: &[&str]) -> std::process::Output {
-    let output = rig_in(at, arguments);
-    assert_eq!(code(&output), 0, "{arguments:?}: {}", stderr(&output));
-    output
-}
+use super::{code, good_in, json, number, object, refused_in, rig_in, stderr, stdout};
 
 /// Where a command wrote the file of this name.
 fn wrote(found: &Value, name: &str) -> PathBuf {
@@ -25,7 +19,7 @@ fn folder_banner_and_summary_carry_overrides_draw_and_version() {
     let at = directory.path();
     let arguments =
         ["deploy", "--seed", "3", "--set", "tread.tau_s=0.2", "--set", "preload.limit_n=52"];
-    let output = good(at, &arguments);
+    let output = good_in(at, &arguments);
     let text = stdout(&output).replace("\n  ", " ");
     assert!(text.contains("seed 3, preload.limit_n = 52, tread.tau_s = 0.2"), "{text}");
     let folder = at.join("out/deploy-prototype-scheduled-3-preload.limit_n=52-tread.tau_s=0.2");
@@ -48,20 +42,20 @@ fn another_run_keeps_its_folder() {
     let at = directory.path();
     let file = at.join("bench.toml");
     std::fs::write(&file, "[tread]\ntau_s = 0.2\n").unwrap();
-    let first = object(&good(at, &["deploy", "bench.toml", "--json"]));
-    let again = object(&good(at, &["deploy", "bench.toml", "--json"]));
+    let first = object(&good_in(at, &["deploy", "bench.toml", "--json"]));
+    let again = object(&good_in(at, &["deploy", "bench.toml", "--json"]));
     assert_eq!(first["files"], again["files"], "the same run");
     // The same name, another run.
     std::fs::write(&file, "[tread]\ntau_s = 0.21\n").unwrap();
-    let other = object(&good(at, &["deploy", "bench.toml", "--json"]));
+    let other = object(&good_in(at, &["deploy", "bench.toml", "--json"]));
     assert_ne!(wrote(&first, "summary.json"), wrote(&other, "summary.json"));
     let digest =
         |found: &Value| json(&at.join(wrote(found, "summary.json")))["trace_digest"].clone();
     assert_eq!(digest(&first), first["trace_digest"]);
     assert_eq!(digest(&other), other["trace_digest"]);
     // Who names the folder gets it, and is told.
-    good(at, &["deploy", "--out", "mine"]);
-    let output = good(at, &["deploy", "--seed", "2", "--out", "mine"]);
+    good_in(at, &["deploy", "--out", "mine"]);
+    let output = good_in(at, &["deploy", "--seed", "2", "--out", "mine"]);
     assert!(stderr(&output).contains("mine: replaces"), "{}", stderr(&output));
 }
 
@@ -70,10 +64,10 @@ fn comparisons_captures_and_identifications_keep_what_is_there() {
     let directory = tempfile::tempdir().unwrap();
     let at = directory.path();
     for (seed, name) in [("1", "a"), ("2", "b"), ("3", "c")] {
-        good(at, &["deploy", "--seed", seed, "--out", name]);
+        good_in(at, &["deploy", "--seed", seed, "--out", name]);
     }
     let compared = |other: &str| {
-        let found = object(&good(at, &["report", "a/log.mcap", other, "--json"]));
+        let found = object(&good_in(at, &["report", "a/log.mcap", other, "--json"]));
         at.join(found["files"][0].as_str().unwrap())
     };
     let (b, c) = (compared("b/log.mcap"), compared("c/log.mcap"));
@@ -82,7 +76,7 @@ fn comparisons_captures_and_identifications_keep_what_is_there() {
     assert_eq!(compared("b/log.mcap"), b, "the same page");
 
     let identified = |log: &str| {
-        let found = object(&good(at, &["identify", log, "--json"]));
+        let found = object(&good_in(at, &["identify", log, "--json"]));
         at.join(wrote(&found, "identified.toml"))
     };
     let (a, b) = (identified("a/log.mcap"), identified("b/log.mcap"));
@@ -91,12 +85,12 @@ fn comparisons_captures_and_identifications_keep_what_is_there() {
     assert_eq!(identified("a/log.mcap"), a, "the same result");
 
     let caught = |arguments: &[&str]| {
-        let output = good(at, &[&["capture", "--json"], arguments].concat());
+        let output = good_in(at, &[&["capture", "--json"], arguments].concat());
         at.join(wrote(&object(&output), "log.mcap").parent().unwrap())
     };
     let first = caught(&["--seed", "1"]);
     let bytes = std::fs::read(first.join("log.mcap")).unwrap();
-    good(at, &["capture", "--seed", "2"]);
+    good_in(at, &["capture", "--seed", "2"]);
     assert!(bytes == std::fs::read(first.join("log.mcap")).unwrap(), "the first capture");
     refused_in(at, &["capture", "--name", "log"], &["log.mcap", "--name"]);
 }
@@ -105,7 +99,7 @@ fn comparisons_captures_and_identifications_keep_what_is_there() {
 fn no_command_writes_over_what_it_reads() {
     let directory = tempfile::tempdir().unwrap();
     let at = directory.path();
-    good(at, &["deploy", "--out", "run"]);
+    good_in(at, &["deploy", "--out", "run"]);
     std::fs::copy(at.join("run/log.mcap"), at.join("other.mcap")).unwrap();
     let log = std::fs::read(at.join("other.mcap")).unwrap();
     for arguments in [
@@ -117,7 +111,7 @@ fn no_command_writes_over_what_it_reads() {
         refused_in(at, &arguments, &["other.mcap", "is read by this command"]);
         assert!(log == std::fs::read(at.join("other.mcap")).unwrap(), "{arguments:?}");
     }
-    good(at, &["params", "restore", "--file", "set.bin"]);
+    good_in(at, &["params", "restore", "--file", "set.bin"]);
     let set = std::fs::read(at.join("set.bin")).unwrap();
     refused_in(at, &["params", "save", "set.bin", "--file", "set.bin"], &["save set.bin"]);
     assert_eq!(set, std::fs::read(at.join("set.bin")).unwrap());
@@ -135,7 +129,7 @@ fn no_command_writes_over_what_it_reads() {
     refused_in(at, &["params", "save", "other.mcap", "--file", "set.bin"], &["save other.mcap"]);
     assert!(log == std::fs::read(at.join("other.mcap")).unwrap());
     // A folder stands for the log in it.
-    let page = good(at, &["report", "run", "--json"]);
+    let page = good_in(at, &["report", "run", "--json"]);
     assert!(at.join("run/log.html").is_file(), "{}", stdout(&page));
     refused_in(at, &["report", "."], &["./log.mcap: No such file"]);
 }

@@ -6,9 +6,9 @@ use hil_sim::scenario::Scenario;
 use hil_sim::session;
 use serde_json::Value;
 
-use crate::record::logs::data;
+use crate::record::logs::{channel, data};
 
-use super::{code, good, json, number, object, refused_in, rig, rig_in, stderr, stdout};
+use super::{code, good, good_in, json, number, object, refused_in, rig, rig_in, stderr, stdout};
 
 /// The frames of a deployment.
 fn frames() -> Vec<Vec<u8>> {
@@ -83,20 +83,18 @@ fn a_log_that_was_tampered_with_shows_its_first_difference() {
 #[test]
 fn a_log_has_its_report_and_two_logs_their_comparison() {
     let directory = tempfile::tempdir().expect("a directory");
+    let at = directory.path();
     for (seed, name) in [("1", "a"), ("2", "b")] {
-        let output = rig_in(directory.path(), &["deploy", "--seed", seed, "--out", name, "--json"]);
-        assert_eq!(code(&output), 0);
+        good_in(at, &["deploy", "--seed", seed, "--out", name]);
     }
-    let a = rig_in(directory.path(), &["report", "a/log.mcap", "--out", "page.html", "--json"]);
-    let summary = json(&directory.path().join("a/summary.json"));
-    assert_eq!(object(&a)["crossings"], summary["crossings"]);
-    let page = |name: &str| std::fs::read_to_string(directory.path().join(name)).expect("a page");
+    let a = rig_in(at, &["report", "a/log.mcap", "--out", "page.html", "--json"]);
+    assert_eq!(object(&a)["crossings"], json(&at.join("a/summary.json"))["crossings"]);
+    let page = |name: &str| std::fs::read_to_string(at.join(name)).expect("a page");
     assert_eq!(page("page.html"), page("a/report.html"), "the page of the deployment itself");
-    let shown = rig_in(directory.path(), &["report", "a/log.mcap", "b/log.mcap"]);
-    assert!(
-        stdout(&shown).starts_with("A: Deployed ") && stdout(&shown).contains("\nB: Deployed ")
-    );
-    let both = rig_in(directory.path(), &["report", "a/log.mcap", "b/log.mcap", "--json"]);
+    let shown = rig_in(at, &["report", "a/log.mcap", "b/log.mcap"]);
+    let text = stdout(&shown);
+    assert!(text.starts_with("A: Deployed ") && text.contains("\nB: Deployed "), "{text}");
+    let both = rig_in(at, &["report", "a/log.mcap", "b/log.mcap", "--json"]);
     let differences = object(&both)["differences"].as_array().expect("a list").clone();
     let gap = differences.iter().find(|d| d["index"] == 2 && d["quantity"] == "gap").expect("gap");
     let change = number(gap, "b") - number(gap, "a");
@@ -167,8 +165,7 @@ fn a_view_without_terminal_ends_by_itself() {
 fn a_view_records_what_it_shows() {
     let directory = tempfile::tempdir().expect("a directory");
     let view = ["live", "--headless", "--fast", "--listen", "127.0.0.1:0", "--record", "kept"];
-    let output = rig_in(directory.path(), &[&view[..], &["--set", "tread.tau_s=0.11"]].concat());
-    assert_eq!(code(&output), 0, "{}", stderr(&output));
+    let output = good_in(directory.path(), &[&view[..], &["--set", "tread.tau_s=0.11"]].concat());
     assert!(stdout(&output).contains("wrote kept/: log.mcap"), "{}", stdout(&output));
     let replayed = rig_in(directory.path(), &["replay", "kept/log.mcap", "kept/log.csv", "--json"]);
     let replayed = object(&replayed);
@@ -183,36 +180,28 @@ fn a_log_of_other_parameters_than_those_given_has_none_and_says_so() {
     let stream = session::run(&scenario, session::Options::ROWS).expect("a run").stream;
     let (directory, line) = file("line.bin", &stream);
     let at = directory.path();
-    let output = rig_in(at, &["capture", "--stream", name(&line), "--out", "without"]);
-    assert_eq!(code(&output), 0);
+    let output = good_in(at, &["capture", "--stream", name(&line), "--out", "without"]);
     assert!(stderr(&output).contains("runs with parameters"), "{}", stderr(&output));
     assert_eq!(code(&rig_in(at, &["replay", "without/log.mcap"])), 2);
     let given = ["capture", "--stream", name(&line), "--out", "with", set[0], set[1]];
     let output = rig_in(at, &given);
     assert!(!stderr(&output).contains("runs with parameters"), "{}", stderr(&output));
     for log in ["with/log.mcap", "with/log.csv"] {
-        assert_eq!(code(&rig_in(at, &["replay", log])), 0, "{log}");
+        good_in(at, &["replay", log]);
     }
 }
 
 #[test]
 fn a_log_of_other_parameters_is_refused_until_they_are_given() {
     let directory = tempfile::tempdir().expect("a directory");
+    let at = directory.path();
     let set = ["--set", "tread.tau_s=0.11"];
-    let capture = ["capture", "--bare", "--out", ".", set[0], set[1]];
-    assert_eq!(code(&rig_in(directory.path(), &capture)), 0);
+    good_in(at, &["capture", "--bare", "--out", ".", set[0], set[1]]);
     // A log that contains its parameters can be run again as it is.
-    assert_eq!(code(&rig_in(directory.path(), &["replay", "log.mcap"])), 0);
+    good_in(at, &["replay", "log.mcap"]);
     // The stream contains nothing but their hash.
-    let bytes = std::fs::read(directory.path().join("log.mcap")).expect("there");
-    let frames: Vec<u8> = mcap::MessageStream::new(&bytes)
-        .expect("a file")
-        .map(|message| message.expect("intact"))
-        .filter(|message| message.channel.topic == hil_sim::record::FRAMES)
-        .flat_map(|message| hil_sim::record::unwrapped(&message.data).to_vec())
-        .collect();
-    std::fs::write(directory.path().join("line.bin"), frames).expect("written");
-    refused_in(directory.path(), &["replay", "line.bin"], &["made with parameters"]);
-    let output = rig_in(directory.path(), &["replay", "line.bin", set[0], set[1]]);
-    assert_eq!(code(&output), 0);
+    let bytes = std::fs::read(at.join("log.mcap")).expect("there");
+    std::fs::write(at.join("line.bin"), channel(&bytes)).expect("written");
+    refused_in(at, &["replay", "line.bin"], &["made with parameters"]);
+    good_in(at, &["replay", "line.bin", set[0], set[1]]);
 }

@@ -4,7 +4,7 @@ mod campaigns;
 mod crossing;
 mod deploy;
 mod input;
-pub(crate) mod kept;
+mod kept;
 mod logs;
 mod others;
 mod read_back;
@@ -58,11 +58,22 @@ pub(crate) fn object(output: &Output) -> Value {
     value
 }
 
-/// The object of a command that must end well.
+/// Runs the command in `directory`, where it must end with this code.
+fn ends_with(expected: i32, directory: &Path, arguments: &[&str]) -> Output {
+    let output = rig_in(directory, arguments);
+    assert_eq!(code(&output), expected, "{arguments:?}: {}", stderr(&output));
+    output
+}
+
+/// Runs the command in `directory`, where it must end well.
+pub(crate) fn good_in(directory: &Path, arguments: &[&str]) -> Output {
+    ends_with(0, directory, arguments)
+}
+
+/// The object of a command that must end well and leaves nothing behind.
 fn good(arguments: &[&str]) -> Value {
-    let output = rig(arguments);
-    assert_eq!(code(&output), 0, "{arguments:?}: {}", stderr(&output));
-    object(&output)
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    object(&good_in(directory.path(), arguments))
 }
 
 /// The number at `key`.

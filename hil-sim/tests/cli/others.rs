@@ -1,19 +1,26 @@
 //! `rig keys`, `rig flash` with other programs in the place of probe-rs, and the help.
 
+use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use super::{code, good, number, rig, stderr, stdout};
+use serde_json::Value;
+
+use super::{code, good, good_in, number, rig, stderr, stdout};
+
+/// The key of this name.
+fn of<'a>(keys: &'a [Value], name: &str) -> &'a Value {
+    keys.iter().find(|key| key["key"] == name).unwrap()
+}
 
 #[test]
 fn keys_are_listed_with_unit_default_and_description() {
     let listed = good(&["keys", "--json", "--rig", "fe"]);
     let keys = listed["keys"].as_array().unwrap();
-    let of = |name: &str| keys.iter().find(|key| key["key"] == name).unwrap();
-    let limit = of("preload.limit_n");
+    let limit = of(keys, "preload.limit_n");
     assert_eq!((limit["unit"].as_str(), number(limit, "default")), (Some("N"), 150.0));
     assert!(limit["description"].as_str().unwrap().len() > 10);
-    assert_eq!(of("run.seed")["default"], 0);
-    assert!(of("rig.step_positions_mm")["default"].is_array());
+    assert_eq!(of(keys, "run.seed")["default"], 0);
+    assert!(of(keys, "rig.step_positions_mm")["default"].is_array());
     let output = rig(&["keys"]);
     assert_eq!(code(&output), 0);
     for key in keys {
@@ -26,13 +33,10 @@ fn keys_are_found_by_a_pattern_with_range_and_mark() {
     let found = good(&["keys", "--json", "FRICTION"]);
     let keys = found["keys"].as_array().unwrap();
     assert!(keys.len() > 2 && keys.len() < 20, "{}", keys.len());
-    let of = |name: &str| keys.iter().find(|key| key["key"] == name).unwrap();
     // Its description has the word.
-    assert_eq!(
-        (&of("plant.mu")["range"][1], &of("plant.mu")["measure"]),
-        (&3.0.into(), &true.into())
-    );
-    assert_eq!(of("mismatch.friction")["measure"], false);
+    let mu = of(keys, "plant.mu");
+    assert_eq!((&mu["range"][1], &mu["measure"]), (&3.0.into(), &true.into()));
+    assert_eq!(of(keys, "mismatch.friction")["measure"], false);
     let text = stdout(&rig(&["keys", "Preload.limit"])).to_owned();
     assert!(text.contains("5 to 180") && !text.contains("drive."), "{text}");
     super::refused(&["keys", "sleeve colour"], &["sleeve colour", "`rig keys`"]);
@@ -78,25 +82,30 @@ fn help_lists_the_verbs_and_is_no_error() {
     assert!(stdout(&rig(&["--version"])).starts_with("rig "));
 }
 
-/// A program in the place of cargo, which has built that program, and compiled it just now or not.
+/// A program of the shell with these lines, in a folder of its own.
 #[cfg(unix)]
-fn cargo_that(built: &str, fresh: bool) -> (tempfile::TempDir, std::path::PathBuf) {
+fn program(script: &str) -> (tempfile::TempDir, PathBuf) {
     use std::os::unix::fs::PermissionsExt;
     let directory = tempfile::tempdir().unwrap();
-    let path = directory.path().join("cargo");
-    let artifact = format!(
-        r#"{{"reason":"compiler-artifact","target":{{"name":"rig-study"}},"executable":"{built}","fresh":{fresh}}}"#
-    );
-    std::fs::write(&path, format!("#!/bin/sh\necho '{artifact}'\n")).unwrap();
+    let path = directory.path().join("program");
+    std::fs::write(&path, format!("#!/bin/sh\n{script}\n")).unwrap();
     std::fs::set_permissions(&path, std::fs::Permissions::from_mode(0o755)).unwrap();
     (directory, path)
+}
+
+/// A program in the place of cargo, which has built a program, and compiled it just now or not.
+#[cfg(unix)]
+fn cargo_that(fresh: bool) -> (tempfile::TempDir, PathBuf) {
+    program(&format!(
+        r#"echo '{{"reason":"compiler-artifact","target":{{"name":"rig-study"}},"executable":"/bin/true","fresh":{fresh}}}'"#
+    ))
 }
 
 #[cfg(unix)]
 #[test]
 fn a_build_is_announced_only_when_something_is_built() {
     for (fresh, said) in [(true, ""), (false, "building the study, once: up to some minutes\n")] {
-        let (_directory, cargo) = cargo_that("/bin/true", fresh);
+        let (_directory, cargo) = cargo_that(fresh);
         let mut rig = Command::new(env!("CARGO_BIN_EXE_rig"));
         let output = rig.env("CARGO", cargo).arg("modes").output().expect("the command starts");
         assert_eq!((code(&output), &*stderr(&output)), (0, said));
@@ -116,7 +125,7 @@ fn help_of_a_verb_of_another_part_builds_nothing() {
     }
 }
 
-fn flash_by(program: &std::path::Path, arguments: &[&str]) -> Output {
+fn flash_by(program: &Path, arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_rig"))
         .env("PROBE_RS", program)
         .arg("flash")
@@ -127,22 +136,14 @@ fn flash_by(program: &std::path::Path, arguments: &[&str]) -> Output {
 
 /// A program in the place of probe-rs: its version, and what it does with its arguments.
 #[cfg(unix)]
-fn stand_in(version: &str, run: &str) -> std::path::PathBuf {
-    use std::os::unix::fs::PermissionsExt;
-
-    let name = format!("probe-rs-{}-{}", std::process::id(), version.replace(' ', "-"));
-    let path = std::env::temp_dir().join(name);
-    let script = format!("#!/bin/sh\ncase $1 in --version) echo '{version}';; *) {run};; esac\n");
-    std::fs::write(&path, script).expect("a file");
-    let mode = std::fs::Permissions::from_mode(0o755);
-    std::fs::set_permissions(&path, mode).expect("a program");
-    path
+fn stand_in(version: &str, run: &str) -> (tempfile::TempDir, PathBuf) {
+    program(&format!("case $1 in --version) echo '{version}';; *) {run};; esac"))
 }
 
 #[cfg(unix)]
 #[test]
 fn the_image_is_flashed_and_read_back_and_only_the_text_log_is_shown() {
-    let probe_rs = stand_in("probe-rs 0.32.0 (git commit: none)", "echo \"$@\"");
+    let (_directory, probe_rs) = stand_in("probe-rs 0.32.0 (git commit: none)", "echo \"$@\"");
     let output = flash_by(&probe_rs, &["--", "--probe", "0483:374b"]);
     assert_eq!(code(&output), 0, "{}", stderr(&output));
     let (arguments, image) = stdout(&output).trim().rsplit_once(' ').expect("arguments");
@@ -150,15 +151,13 @@ fn the_image_is_flashed_and_read_back_and_only_the_text_log_is_shown() {
                     --rtt-up-channels 0 --rtt-channel-mode no-block-skip --probe 0483:374b";
     assert_eq!(arguments, expected);
     assert!(std::fs::read(image).expect("an image").starts_with(b"\x7fELF"), "{image}");
-    let _ = std::fs::remove_file(probe_rs);
 }
 
 #[cfg(unix)]
 #[test]
 fn the_exit_code_is_that_of_probe_rs() {
-    let probe_rs = stand_in("probe-rs 1.0.0", "exit 1");
+    let (_directory, probe_rs) = stand_in("probe-rs 1.0.0", "exit 1");
     assert_eq!(code(&flash_by(&probe_rs, &[])), 1);
-    let _ = std::fs::remove_file(probe_rs);
 }
 
 #[cfg(unix)]
@@ -168,12 +167,11 @@ fn probe_rs_has_to_be_there_and_new_enough() {
     assert_eq!(code(&output), 2);
     let text = stderr(&output);
     assert!(text.contains("/no/such/probe-rs: ") && text.contains("probe-rs-tools"), "{text}");
-    let old = stand_in("probe-rs 0.31.0", "echo it ran");
+    let (_directory, old) = stand_in("probe-rs 0.31.0", "echo it ran");
     let output = flash_by(&old, &[]);
     assert_eq!((code(&output), stdout(&output)), (2, ""));
     let text = stderr(&output);
     assert!(text.contains("probe-rs 0.31.0") && text.contains("0.32"), "{text}");
-    let _ = std::fs::remove_file(old);
 }
 
 /// Minutes of building for a probe that is not there would be in vain.
@@ -181,7 +179,7 @@ fn probe_rs_has_to_be_there_and_new_enough() {
 #[test]
 fn a_probe_is_looked_for_before_anything_is_built() {
     let found = r#"case $1 in list) echo "No debug probes were found.";; *) echo it ran;; esac"#;
-    let alone = stand_in("probe-rs 0.33.0", found);
+    let (_directory, alone) = stand_in("probe-rs 0.33.0", found);
     let directory = tempfile::tempdir().unwrap();
     for arguments in [
         &["flash"][..],
@@ -201,10 +199,8 @@ fn a_probe_is_looked_for_before_anything_is_built() {
         let said = stderr(&output);
         assert_eq!((code(&output), stdout(&output)), (2, ""), "{arguments:?}: {said}");
         assert!(said.contains("no debug probe") && said.lines().count() == 1, "{said}");
-        let left = std::fs::read_dir(directory.path()).unwrap().next();
-        assert!(left.is_none(), "{arguments:?} left {left:?}");
+        assert!(super::is_empty(directory.path()), "{arguments:?} left files");
     }
-    let _ = std::fs::remove_file(alone);
 }
 
 #[test]
@@ -213,10 +209,7 @@ fn a_file_that_becomes_active_is_asked_for_what_no_default_knows() {
     let at = directory.path();
     let restored = |file: &str, text: &str| {
         std::fs::write(at.join(file), text).unwrap();
-        let arguments = ["params", "restore", file, "--file", "board.set"];
-        let output = super::rig_in(at, &arguments);
-        assert_eq!(code(&output), 0, "{}", stderr(&output));
-        stderr(&output)
+        stderr(&good_in(at, &["params", "restore", file, "--file", "board.set"]))
     };
     let mine = "[rig]\nwheel_width_mm = 31.0\n[sources]\n\"rig.wheel_radius_mm\" = \"calliper\"\n";
     let said = restored("mine.toml", mine);
@@ -228,8 +221,7 @@ fn a_file_that_becomes_active_is_asked_for_what_no_default_knows() {
     for other in ["rig.wheel_width_mm", "rig.wheel_radius_mm", "drive.cruise_speed_mm_s"] {
         assert!(!said.contains(other), "{other}: {said}");
     }
-    let saved = ["params", "save", "all.toml", "--file", "board.set"];
-    assert_eq!(code(&super::rig_in(at, &saved)), 0);
+    good_in(at, &["params", "save", "all.toml", "--file", "board.set"]);
     let all = std::fs::read_to_string(at.join("all.toml")).unwrap();
     assert!(restored("all.toml", &all).contains("rig.wheel_radius_mm"), "whose are they?");
     super::refused_in(at, &["params", "get"], &["--target", "--file"]);
@@ -243,9 +235,11 @@ fn a_release_runs_and_flashes_without_a_toolchain() {
     use std::fs;
     use std::os::unix::fs::PermissionsExt;
 
+    use sha2::{Digest, Sha256};
+
     let folder = tempfile::tempdir().expect("a directory");
     let at = |name: &str| folder.path().join(name);
-    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let python = |arguments: &[&std::ffi::OsStr]| {
         let mut python = Command::new("python3");
         let output = python.current_dir(folder.path()).args(arguments).output();
@@ -270,8 +264,8 @@ fn a_release_runs_and_flashes_without_a_toolchain() {
     let place = at(archive.trim_end_matches(".tar.gz"));
     let sums = fs::read_to_string(place.join("SHA256SUMS")).expect("sums");
     for (line, name) in sums.lines().zip(["rig", "rig-probe", "interstage", "LICENSE-MIT"]) {
-        let sum = sha256(&fs::read(place.join(name)).expect("a file"));
-        assert_eq!(line, format!("{sum}  {name}"));
+        let sum = Sha256::digest(fs::read(place.join(name)).expect("a file"));
+        assert_eq!(line, format!("{sum:x}  {name}"));
     }
     fs::write(at("probe-rs"), "#!/bin/sh\necho probe-rs 0.32.0 \"$@\"\n").expect("a program");
     fs::set_permissions(at("probe-rs"), fs::Permissions::from_mode(0o755)).expect("a program");
@@ -286,11 +280,4 @@ fn a_release_runs_and_flashes_without_a_toolchain() {
     let flashed = rig(&["flash"]);
     let elf = place.canonicalize().expect("there").join("interstage");
     assert!(stdout(&flashed).trim().ends_with(elf.to_str().unwrap()), "{}", stdout(&flashed));
-}
-
-/// The sum of a file as a release states it.
-#[cfg(unix)]
-fn sha256(bytes: &[u8]) -> String {
-    use sha2::{Digest, Sha256};
-    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
 }

@@ -6,18 +6,11 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use super::{code, number, object, refused_in, rig_in, stderr, stdout};
-
-/// Runs the command, which must end with this code.
-fn ends_with(expected: i32, at: &Path, arguments: &[&str]) -> std::process::Output {
-    let output = rig_in(at, arguments);
-    assert_eq!(code(&output), expected, "{arguments:?}: {}", stderr(&output));
-    output
-}
+use super::{ends_with, good_in, number, object, refused_in, stdout};
 
 /// The parameters that `rig identify` finds in a log: name; value, low and high end.
 fn identified(at: &Path, log: &str) -> Vec<(String, [Option<f64>; 3])> {
-    let found = object(&ends_with(0, at, &["identify", log, "--json"]));
+    let found = object(&good_in(at, &["identify", log, "--json"]));
     let all = found["parameters"].as_array().expect("a list").clone();
     let of = |p: &Value| ["value", "low", "high"].map(|key| p[key].as_f64());
     let name = |p: &Value| p["name"].as_str().expect("a name").to_owned();
@@ -28,9 +21,9 @@ fn identified(at: &Path, log: &str) -> Vec<(String, [Option<f64>; 3])> {
 fn table_and_mcap_of_a_run_identify_the_same_rig() {
     let directory = tempfile::tempdir().unwrap();
     let at = directory.path();
-    ends_with(0, at, &["deploy", "--rig", "fe", "--seed", "2", "--out", "deployed"]);
-    ends_with(0, at, &["capture", "--rig", "fe", "--seed", "2", "--out", "captured"]);
-    ends_with(0, at, &["deploy", "--retract", "--out", "back"]);
+    good_in(at, &["deploy", "--rig", "fe", "--seed", "2", "--out", "deployed"]);
+    good_in(at, &["capture", "--rig", "fe", "--seed", "2", "--out", "captured"]);
+    good_in(at, &["deploy", "--retract", "--out", "back"]);
     for run in ["deployed", "captured", "back"] {
         let [table, mcap] =
             ["csv", "mcap"].map(|ending| identified(at, &format!("{run}/log.{ending}")));
@@ -43,13 +36,13 @@ fn table_and_mcap_of_a_run_identify_the_same_rig() {
 fn a_table_without_its_parameters_is_refused_until_they_are_given() {
     let directory = tempfile::tempdir().unwrap();
     let at = directory.path();
-    ends_with(0, at, &["deploy", "--rig", "fe", "--out", "run"]);
+    good_in(at, &["deploy", "--rig", "fe", "--out", "run"]);
     std::fs::copy(at.join("run/log.csv"), at.join("alone.csv")).unwrap();
     refused_in(at, &["identify", "alone.csv"], &["alone.csv", "--rig"]);
     refused_in(at, &["replay", "alone.csv"], &["alone.csv", "--set"]);
     refused_in(at, &["report", "alone.csv"], &["alone.csv", "log.mcap"]);
-    let given = object(&ends_with(0, at, &["identify", "alone.csv", "--rig", "fe", "--json"]));
-    let known = object(&ends_with(0, at, &["identify", "run/log.mcap", "--json"]));
+    let given = object(&good_in(at, &["identify", "alone.csv", "--rig", "fe", "--json"]));
+    let known = object(&good_in(at, &["identify", "run/log.mcap", "--json"]));
     assert_eq!(given["parameters"], known["parameters"]);
 }
 
@@ -57,9 +50,9 @@ fn a_table_without_its_parameters_is_refused_until_they_are_given() {
 fn a_captured_log_reports_what_was_measured_and_calls_nothing_true() {
     let directory = tempfile::tempdir().unwrap();
     let at = directory.path();
-    ends_with(0, at, &["capture", "--seed", "4", "--out", "."]);
-    ends_with(0, at, &["deploy", "--seed", "4", "--out", "real"]);
-    let output = ends_with(0, at, &["report", "log.mcap", "--out", "page.html"]);
+    good_in(at, &["capture", "--seed", "4", "--out", "."]);
+    good_in(at, &["deploy", "--seed", "4", "--out", "real"]);
+    let output = good_in(at, &["report", "log.mcap", "--out", "page.html"]);
     let text = stdout(&output).split_whitespace().collect::<Vec<_>>().join(" ");
     assert!(text.contains("worst measured gap 2."), "{text}");
     assert!(text.contains("the reference of 2.653 mm"), "{text}");
@@ -70,8 +63,8 @@ fn a_captured_log_reports_what_was_measured_and_calls_nothing_true() {
     for word in [">true<", ">true gap<", "true value", "gross slip", "Gross slip"] {
         assert!(!page.contains(word), "{word}");
     }
-    let measured = object(&ends_with(0, at, &["report", "log.mcap", "--json"]));
-    let truth = object(&ends_with(0, at, &["report", "real/log.mcap", "--json"]));
+    let measured = object(&good_in(at, &["report", "log.mcap", "--json"]));
+    let truth = object(&good_in(at, &["report", "real/log.mcap", "--json"]));
     assert_eq!((&measured["measured"], &truth["measured"]), (&true.into(), &false.into()));
     let off = number(&measured, "max_gap_mm") / number(&truth, "max_gap_mm") - 1.0;
     assert!(off != 0.0 && off.abs() < 0.05, "{off}");
@@ -89,11 +82,10 @@ fn cut(at: &Path, file: &str, tenths: usize, to: &str) {
 fn a_truncated_log_says_how_much_is_missing_and_ends_with_one() {
     let directory = tempfile::tempdir().unwrap();
     let at = directory.path();
-    ends_with(0, at, &["deploy", "--out", "run"]);
-    ends_with(0, at, &["capture", "--out", "caught"]);
+    good_in(at, &["deploy", "--out", "run"]);
+    good_in(at, &["capture", "--out", "caught"]);
     let ticks = Value::from(
-        1000.0
-            * number(&object(&ends_with(0, at, &["report", "run/log.mcap", "--json"])), "total_s"),
+        1000.0 * number(&object(&good_in(at, &["report", "run/log.mcap", "--json"])), "total_s"),
     );
     for (log, to) in [("run/log.mcap", "run.mcap"), ("caught/log.mcap", "caught.mcap")] {
         cut(at, log, 6, to);
@@ -133,7 +125,7 @@ fn table(path: &Path) -> (Vec<String>, Vec<csv::StringRecord>) {
 fn columns_have_no_sentinels_and_modes_and_stages_their_names() {
     let directory = tempfile::tempdir().unwrap();
     let at = directory.path();
-    ends_with(0, at, &["deploy", "--out", "."]);
+    good_in(at, &["deploy", "--out", "."]);
     let (head, rows) = table(&at.join("log.csv"));
     let column = |name: &str| {
         let place = head.iter().position(|other| other == name).unwrap_or_else(|| panic!("{name}"));
@@ -156,7 +148,7 @@ fn columns_have_no_sentinels_and_modes_and_stages_their_names() {
     let codes: Vec<i32> = column("arm_angle_code").filter_map(|text| text.parse().ok()).collect();
     assert!(codes.len() > 3000 && codes.iter().all(|code| (0..1 << 14).contains(code)));
     assert!(codes.windows(2).all(|pair| (pair[0] - pair[1]).abs() < 100));
-    ends_with(0, at, &["replay", "log.csv", "log.mcap"]);
+    good_in(at, &["replay", "log.csv", "log.mcap"]);
 
     let bytes = std::fs::read(at.join("log.mcap")).unwrap();
     let mut topics = BTreeSet::new();

@@ -1,14 +1,13 @@
 //! `rig sweep`.
 
-use super::{code, number, object, refused, rig_in, stderr, stdout};
+use super::{good_in, number, object, refused, rig_in, stdout};
 
 #[test]
 fn a_grid_of_deployments_has_rows_table_and_picture() {
     let directory = tempfile::tempdir().unwrap();
     let at = directory.path();
     let keys = ["--key", "tread.tau_s=0.05..0.2:3", "--key", "run.controller=scheduled,constant"];
-    let output = rig_in(at, &[&["sweep", "--json"], &keys[..]].concat());
-    assert_eq!(code(&output), 0, "{}", stderr(&output));
+    let output = good_in(at, &[&["sweep", "--json"], &keys[..]].concat());
     let found = object(&output);
     let rows = found["rows"].as_array().unwrap();
     assert_eq!(rows.len(), 6);

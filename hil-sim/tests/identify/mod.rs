@@ -5,8 +5,7 @@ mod hidden;
 
 use std::collections::BTreeMap;
 
-use crate::cli::kept::good;
-use crate::cli::{code, object, refused_in, rig_in, stderr};
+use crate::cli::{code, good_in, object, refused_in, rig_in, stderr};
 use hidden::Line;
 use hil_sim::identify::published::{self, AMPLITUDE_MM};
 use hil_sim::plant::wall::{Step, Wall};
@@ -113,7 +112,7 @@ fn logs_of_two_rigs_are_refused_and_the_odd_one_is_named() {
     let directory = tempfile::tempdir().unwrap();
     let at = directory.path();
     let log = |name: &str, more: &[&str]| {
-        good(at, &[&["deploy", "--out", name], more].concat());
+        good_in(at, &[&["deploy", "--out", name], more].concat());
         format!("{name}/log.mcap")
     };
     let light = ["--controller", "constant", "--set", "preload.cruise_n=25"];
@@ -128,7 +127,7 @@ fn logs_of_two_rigs_are_refused_and_the_odd_one_is_named() {
         let other = log("other", &["--set", set]);
         refused_in(at, &["identify", &nominal, &other], &["not of the rig of the other logs"]);
     }
-    good(at, &["identify", &one, &of_one]);
+    good_in(at, &["identify", &one, &of_one]);
     // A log is accepted; a reading of the first one, or rubber that it was not told of, is not.
     let judged = |logs: &[&str]| object(&rig_in(at, &[&["accept", "--json"], logs].concat()));
     let back = log("back", &["--retract"]);
@@ -171,10 +170,10 @@ fn the_command_reads_what_deployments_leave_and_writes_what_one_can_run() {
         ("light", &["--seed", "4", "--controller", "constant", "--set", "preload.cruise_n=25"]),
     ];
     for (name, arguments) in runs {
-        good(at, &[&["deploy", "--out", name], arguments].concat());
+        good_in(at, &[&["deploy", "--out", name], arguments].concat());
     }
     let output =
-        good(at, &["identify", "fast/log.mcap", "light/log.mcap", "--out", "found", "--json"]);
+        good_in(at, &["identify", "fast/log.mcap", "light/log.mcap", "--out", "found", "--json"]);
     let found = object(&output);
     assert!(found["degrees_of_freedom"].as_u64().unwrap() > 1000);
     assert!(found["residuals"].as_array().unwrap().len() == 8, "{found}");
@@ -189,5 +188,5 @@ fn the_command_reads_what_deployments_leave_and_writes_what_one_can_run() {
     for file in found["files"].as_array().unwrap() {
         assert!(at.join(file.as_str().unwrap()).is_file(), "{file}");
     }
-    good(at, &["deploy", "found/identified.toml", "--no-files", "--json"]);
+    good_in(at, &["deploy", "found/identified.toml", "--no-files", "--json"]);
 }

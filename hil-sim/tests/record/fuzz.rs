@@ -17,7 +17,7 @@ use hil_sim::replay::replay;
 use hil_sim::scenario::Scenario;
 use interstage::rig::Rig;
 
-use super::logs::data;
+use super::logs::{channel, data};
 use mutate::{Chance, fuzz, mutant};
 
 fn text(bytes: &[u8]) -> String {
@@ -26,14 +26,13 @@ fn text(bytes: &[u8]) -> String {
 
 #[test]
 fn scenario_files() {
-    let anomalies = "[run]\nseed = 3\nanomalies = [\"late 1 2.5\"]\n";
     let corpus = [
         Scenario::default().to_toml().into_bytes(),
         Scenario::named("fe").expect("a preset").to_toml().into_bytes(),
         b"preset = \"fe\"\n[tread]\ntau_s = 0.2\n[plant]\nmu = 0.9\n".to_vec(),
-        anomalies.as_bytes().to_vec(),
+        // Refused, which is fine.
+        b"[run]\nseed = 3\nanomalies = [\"late 1 2.5\"]\n".to_vec(),
     ];
-    // The last one is refused, which is fine.
     fuzz("scenario files", &corpus, 1500, 4.0, |bytes| {
         let _ = Scenario::parse("fuzz.toml", &text(bytes), &[]);
     });
@@ -55,63 +54,43 @@ fn fixture(name: &str) -> Vec<u8> {
     fs::read(data(name)).expect("a fixture")
 }
 
-/// The frames of a fixture as on the channel.
-fn stream(mcap: &[u8]) -> Vec<u8> {
-    let messages = mcap::MessageStream::new(mcap).expect("an MCAP file");
-    messages
-        .filter_map(Result::ok)
-        .filter(|message| message.channel.topic == hil_sim::record::FRAMES)
-        .flat_map(|message| hil_sim::record::unwrapped(&message.data).to_vec())
-        .collect()
+/// The beginning of a fixture's frames as on the channel.
+fn beginning(name: &str) -> Vec<u8> {
+    channel(&fixture(name))[..8000].to_vec()
 }
 
-/// The beginning of a stream.
-fn beginning(stream: &[u8]) -> Vec<u8> {
-    stream[..stream.len().min(8000)].to_vec()
+/// Reads a file of these bytes, which may be refused.
+fn read(bytes: &[u8]) {
+    let directory = tempfile::tempdir().expect("a directory");
+    let path = directory.path().join("log");
+    fs::write(&path, bytes).expect("written");
+    if let Ok(run) = Run::read(&path) {
+        let _ = run.is_complete();
+    }
 }
 
 #[test]
 fn logs() {
-    let directory = tempfile::tempdir().expect("a directory");
-    let path = directory.path().join("log");
-    let mut read = |bytes: &[u8]| {
-        fs::write(&path, bytes).expect("written");
-        if let Ok(run) = Run::read(&path) {
-            let _ = run.is_complete();
-        }
-    };
-    let mcap = fixture("deploy.mcap");
-    let streams: Vec<Vec<u8>> = [&mcap, &fixture("retract.mcap")]
-        .into_iter()
-        .map(|file| beginning(&stream(file)))
-        .collect();
-    assert!(streams.iter().all(|stream| stream.len() == 8000), "the fixtures hold frames");
-    fuzz("streams", &streams, 2000, 2.0, &mut read);
+    let streams = ["deploy.mcap", "retract.mcap"].map(beginning);
+    fuzz("streams", &streams, 2000, 2.0, read);
     let row = Run::of_stream(&streams[0]).rows.first().cloned().expect("a row");
     let mut csv = csv::Writer::from_writer(Vec::new());
     for _ in 0..20 {
         csv.serialize(row).expect("a row");
     }
-    fuzz("CSV files", &[csv.into_inner().expect("flushed")], 2000, 2.0, &mut read);
+    fuzz("CSV files", &[csv.into_inner().expect("flushed")], 2000, 2.0, read);
 }
 
 #[test]
 fn mcap_files() {
-    let directory = tempfile::tempdir().expect("a directory");
-    let path = directory.path().join("log.mcap");
     let intact = Run::read(&data("deploy.mcap")).expect("a log");
     assert!(intact.is_complete() && intact.rows.len() > 4500, "{} rows", intact.rows.len());
-    fuzz("MCAP files", &[fixture("deploy.mcap")], 300, 4.0, |bytes| {
-        fs::write(&path, bytes).expect("written");
-        if let Ok(run) = Run::read(&path) {
-            let _ = run.is_complete();
-        }
-    });
+    fuzz("MCAP files", &[fixture("deploy.mcap")], 300, 4.0, read);
 }
 
 #[test]
 fn replays_of_damaged_streams() {
-    let streams = [beginning(&stream(&fixture("deploy.mcap")))];
+    let streams = [beginning("deploy.mcap")];
     let rig = Rig::prototype();
     fuzz("replay", &streams, 200, 3.0, |bytes| {
         let run = Run::of_stream(bytes);

@@ -8,8 +8,7 @@ use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use hil_sim::record::write_mcap;
-use hil_sim::record::{Decoder, Item, Mark, Run};
+use hil_sim::record::{Decoder, FRAMES, Item, Mark, Run, unwrapped, write_mcap};
 use hil_sim::replay::replay;
 use hil_sim::scenario::Scenario;
 use hil_sim::session::{Options, RunningRig, Session};
@@ -30,6 +29,16 @@ const PRELOAD_N: f64 = 1.0;
 
 pub(crate) fn data(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(name)
+}
+
+/// The frames in an MCAP file as on the channel.
+pub(crate) fn channel(mcap: &[u8]) -> Vec<u8> {
+    let messages = mcap::MessageStream::new(mcap).expect("an MCAP file");
+    messages
+        .map(|message| message.expect("intact"))
+        .filter(|message| message.channel.topic == FRAMES)
+        .flat_map(|message| unwrapped(&message.data).to_vec())
+        .collect()
 }
 
 #[test]
