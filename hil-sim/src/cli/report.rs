@@ -93,24 +93,17 @@ fn one(args: &Args, log: &Path, boots: &[Recording]) -> Result<Outcome, Failure>
         write_text(to, &picture.ok_or_else(none)?)?;
         files.push(to.clone());
     }
-    let human = || {
-        let one = |(n, boot): (usize, &Recording)| {
-            let text = terminal::run(&boot.summary, &[], args.verbose);
-            format!("start {} of {}\n{text}", n + 1, boots.len())
-        };
-        boots.iter().enumerate().map(one).collect::<String>() + &output::wrote(&files)
-    };
-    match boots {
-        [boot] => {
-            let printed = WithFiles { result: &boot.summary, files: &files };
-            output::result(args.json, &printed, || {
-                terminal::run(&boot.summary, &files, args.verbose)
-            })?;
-        }
-        _ => {
-            let summaries: Vec<&Summary> = boots.iter().map(|boot| &boot.summary).collect();
-            output::result(args.json, &json!({ "starts": summaries, "files": files }), human)?;
-        }
+    let text = |boot: &Recording| terminal::run(&boot.summary, &[], args.verbose);
+    if let [boot] = boots {
+        let printed = WithFiles { result: &boot.summary, files: &files };
+        output::result(args.json, &printed, || text(boot) + &output::wrote(&files))?;
+    } else {
+        let summaries: Vec<&Summary> = boots.iter().map(|boot| &boot.summary).collect();
+        let starts = (1..).zip(boots);
+        let one = |(n, boot)| format!("start {n} of {}\n{}", boots.len(), text(boot));
+        output::result(args.json, &json!({ "starts": summaries, "files": files }), || {
+            starts.map(one).collect::<String>() + &output::wrote(&files)
+        })?;
     }
     Ok(Outcome::of(boots.iter().all(|boot| boot.summary.missing.is_empty())))
 }

@@ -343,9 +343,8 @@ fn kind(value: &Value) -> &'static str {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::record::decoder::tests::deployment;
     use crate::report::example;
-    use crate::scenario::Scenario;
-    use crate::session;
 
     #[test]
     fn messages_and_metadata_are_read_back_in_order_of_time() {
@@ -393,8 +392,7 @@ mod tests {
             let frame: Vec<u8> = (0..length).map(|i| (i * 7 % 251) as u8).collect();
             assert_eq!(unwrapped(&wrapped(&frame)), frame, "{length}");
         }
-        let recording = session::run(&Scenario::default(), session::Options::ROWS).unwrap();
-        assert!(pieces(&recording.stream).all(|frame| unwrapped(frame) == frame));
+        assert!(pieces(&deployment().stream).all(|frame| unwrapped(frame) == frame));
     }
 
     #[test]

@@ -86,16 +86,10 @@ mod tests {
 
     use super::*;
     use crate::probe::script::{Next, open};
+    use crate::record::decoder::tests::deployment;
     use crate::record::{Mark, Run, Writer};
     use crate::replay::replay;
-    use crate::scenario::Scenario;
-    use crate::session;
     use interstage::rig::Rig;
-
-    /// The frames of a run in software, as a board would send them.
-    fn sent() -> Vec<u8> {
-        session::run(&Scenario::default(), session::Options::ROWS).unwrap().stream
-    }
 
     /// Sends a letter, then captures what the polls of the channel return; empty polls after
     /// them pass the rest on.
@@ -131,7 +125,7 @@ mod tests {
 
     #[test]
     fn a_cable_that_is_pulled_leaves_a_marked_gap_and_the_rest_intact() {
-        let bytes = sent();
+        let bytes = deployment().stream;
         let all = Run::of_stream(&bytes);
         // At a third of the log, at an arbitrary byte, 20 kB are lost.
         let (from, lost) = (bytes.len() / 3, 20_000);
@@ -181,7 +175,7 @@ mod tests {
 
     #[test]
     fn a_restart_in_the_middle_is_marked_and_both_parts_are_there() {
-        let bytes = sent();
+        let bytes = deployment().stream;
         let all = Run::of_stream(&bytes);
         let before = in_polls(&bytes[..bytes.len() / 2]);
         let (run, _) = captured(before.chain(pulled()).chain(in_polls(&bytes)));

@@ -251,18 +251,14 @@ mod tests {
     use serde_json::json;
 
     use super::*;
+    use crate::record::decoder::tests::deployment;
     use crate::record::write_mcap;
-    use crate::session;
-
-    fn run() -> Recording {
-        session::run(&Scenario::default(), session::Options::ROWS).unwrap()
-    }
 
     #[test]
     fn the_log_of_a_deployment_gives_its_recording_back() {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("log.mcap");
-        let written = run();
+        let written = deployment();
         write_mcap(&written, &path).unwrap();
         let read = recordings(&path).unwrap().remove(0);
         assert_eq!(read.summary, written.summary);
@@ -277,7 +273,7 @@ mod tests {
 
     #[test]
     fn a_log_without_the_command_has_no_duration() {
-        let stream = run().stream;
+        let stream = deployment().stream;
         let whole = Run::of_stream(&stream);
         assert!(commanded(&whole).is_some());
         // A capture that began while the preload was building.
@@ -290,7 +286,7 @@ mod tests {
 
     #[test]
     fn a_log_without_truth_shows_what_the_controller_believes() {
-        let truth = run();
+        let truth = deployment();
         let believed = measured(&Run::of_stream(&truth.stream));
         assert!(believed.summary.completed);
         assert!((believed.summary.moving_s - truth.summary.moving_s).abs() < 2e-3);

@@ -129,12 +129,11 @@ impl View {
 mod tests {
     use super::*;
     use crate::record::Decoder;
-    use crate::scenario::Scenario;
-    use crate::session;
+    use crate::record::decoder::tests::deployment;
 
     #[test]
     fn the_state_shows_what_came_last() {
-        let stream = session::run(&Scenario::default(), session::Options::ROWS).unwrap().stream;
+        let stream = deployment().stream;
         let (mut view, mut decoder) = (View::default(), Decoder::new());
         let mut first = None;
         decoder.read(&stream, &mut |item| {

@@ -243,11 +243,10 @@ mod tests {
     use std::sync::{Arc, Mutex};
 
     use super::*;
+    use crate::record::decoder::tests::deployment;
     use crate::record::read::tests::read;
     use crate::record::{Run, Summary};
     use crate::report::example;
-    use crate::scenario::Scenario;
-    use crate::session;
 
     /// A disk of so many bytes.
     #[derive(Clone)]
@@ -284,10 +283,6 @@ mod tests {
         }
     }
 
-    fn stream() -> Vec<u8> {
-        session::run(&Scenario::default(), session::Options::ROWS).unwrap().stream
-    }
-
     /// Writes the stream in pieces to an MCAP file and a table on these disks.
     fn write(stream: &[u8], [mcap, csv]: &[Disk; 2]) -> Result<Counts, WriteError> {
         let (mcap, csv) = (Some(mcap.clone()), Some(csv.clone()));
@@ -306,9 +301,9 @@ mod tests {
 
     #[test]
     fn both_files_give_back_what_came() {
-        let (counts, files) = written(&stream());
-        let (run, [mcap, csv]) =
-            (Run::of_stream(&stream()), files.map(|file| read(&file).unwrap()));
+        let stream = deployment().stream;
+        let (counts, files) = written(&stream);
+        let (run, [mcap, csv]) = (Run::of_stream(&stream), files.map(|file| read(&file).unwrap()));
         assert_eq!(counts, run.counts);
         assert_eq!(csv.rows, run.rows);
         assert_eq!(mcap.parameters.as_deref(), Some("[run]\nseed = 0\n"));
@@ -318,7 +313,7 @@ mod tests {
 
     #[test]
     fn a_full_disk_is_reported_and_what_was_written_stays_readable() {
-        let stream = stream();
+        let stream = deployment().stream;
         for (mcap, csv) in [(400_000, u64::MAX), (u64::MAX, 500_000)] {
             let disks = [Disk::of(mcap), Disk::of(csv)];
             let error = write(&stream, &disks).unwrap_err();
@@ -335,7 +330,7 @@ mod tests {
 
     #[test]
     fn a_file_cut_anywhere_is_read_up_to_there() {
-        let (_, [file, _]) = written(&stream());
+        let (_, [file, _]) = written(&deployment().stream);
         let mut before = 0;
         for tenth in 4..10 {
             let run = read(&file[..file.len() * tenth / 10]).unwrap();
@@ -350,7 +345,7 @@ mod tests {
 
     #[test]
     fn time_in_the_file_never_goes_back_even_if_the_target_restarts() {
-        let (counts, [content, _]) = written(&[stream(), stream()].concat());
+        let (counts, [content, _]) = written(&deployment().stream.repeat(2));
         assert_eq!(counts.restarts, 1);
         let mut last = 0;
         for message in mcap::MessageStream::new(&content).unwrap() {

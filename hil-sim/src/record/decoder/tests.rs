@@ -1,7 +1,15 @@
 use super::*;
+use crate::record::Recording;
+use crate::scenario::Scenario;
+use crate::session;
 use interstage::log::{LogEncoder, identity};
 use interstage::tick::{Input, Output};
 use proptest::prelude::*;
+
+/// A deployment with its rows and frames.
+pub(crate) fn deployment() -> Recording {
+    session::run(&Scenario::default(), session::Options::ROWS).unwrap()
+}
 
 /// The frames of a target that runs for so many ticks from `from`.
 pub(crate) fn frames(from: u32, ticks: u32) -> Vec<Vec<u8>> {
