@@ -221,17 +221,11 @@ mod tests {
     }
 
     #[test]
-    fn injected_faults_are_named_before_those_found() {
+    fn what_was_injected_comes_first_then_faults_and_limits_in_the_order_of_time() {
         let mut summary = example::faulted().summary;
         summary.injected = vec!["preload-sensor stuck from 2 s".to_owned()];
-        let text = reports(&summary);
-        assert!(text.starts_with("<p>Injected: preload-sensor stuck from 2 s.</p>"), "{text}");
-        assert!(text.contains("fault 121"));
-    }
-
-    #[test]
-    fn faults_and_limits_are_in_the_order_of_time() {
-        let html = reports(&example::faulted().summary);
+        let html = reports(&summary);
+        assert!(html.starts_with("<p>Injected: preload-sensor stuck from 2 s.</p>"), "{html}");
         assert!(html.find("limit 201").unwrap() < html.find("fault 121").unwrap());
         assert!(html.contains("limit &amp; speed"));
         assert!(reports(&Summary::default()).contains("No fault"));
