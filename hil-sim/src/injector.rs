@@ -15,9 +15,8 @@ use sensor::FaultySensor;
 use crate::plant::rig::{Drives, Truth, VirtualRig};
 use crate::scenario::injection::{Injection, Kind, Onset, Target};
 use crate::scenario::{Direction, Scenario};
+use crate::session::TICK_S;
 
-/// Control period, s.
-const TICK_S: f64 = 1e-3;
 /// Difference of duty from which on a fault acts.
 const ACTS: f64 = 0.02;
 /// Difference of duty from which on the readback must show the fault: its tolerance band, and
