@@ -46,15 +46,11 @@ mod tests {
     }
 
     #[test]
-    fn missing_and_outside_values_break_the_line() {
+    fn missing_and_outside_values_break_the_line_and_one_that_turns_back_keeps_its_order() {
         let points =
             [(0.0, 1.0), (1.0, f64::NAN), (2.0, 1.0), (3.0, f64::INFINITY), (4.0, 2.0), (9.0, 1.0)];
         let pieces = decimate(&points, (0.0, 5.0), 10);
         assert_eq!(pieces, [vec![(0.0, 1.0)], vec![(2.0, 1.0)], vec![(4.0, 2.0)]]);
-    }
-
-    #[test]
-    fn a_line_that_turns_back_keeps_its_order() {
         let points = [(0.0, 0.0), (5.0, 1.0), (0.0, 2.0)];
         assert_eq!(decimate(&points, (0.0, 10.0), 10), [points.to_vec()]);
     }

@@ -69,6 +69,9 @@ impl Across {
     }
 }
 
+/// A field of the rows, as a line with its name and look.
+type Field = (&'static str, Look, fn(&Tick) -> f64);
+
 /// The run as the plots need it.
 pub(super) struct View<'a> {
     pub(super) recording: &'a Recording,
@@ -132,11 +135,8 @@ impl<'a> View<'a> {
         Line { name: name.into(), look, points }
     }
 
-    /// Lines of fields, each with its name and look.
-    pub(super) fn lines<const N: usize>(
-        &self,
-        fields: [(&'static str, Look, fn(&Tick) -> f64); N],
-    ) -> Vec<Line> {
+    /// Lines of these fields.
+    pub(super) fn lines<const N: usize>(&self, fields: [Field; N]) -> Vec<Line> {
         fields.map(|(name, look, of)| self.line(name, look, of)).into()
     }
 

@@ -304,11 +304,7 @@ mod tests {
         let least = clearances.fold(f64::INFINITY, f64::min);
         assert!((2.0..3.0).contains(&least), "{least}");
         assert!(!scene.json().contains("NaN"));
-    }
-
-    #[test]
-    fn a_run_with_unknown_parameters_has_no_scene() {
-        let mut recording = example::deploy();
+        // With unknown parameters there is none.
         recording.parameters = "not parameters".to_owned();
         assert!(Scene::new(&recording).is_none());
     }

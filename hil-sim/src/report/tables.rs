@@ -138,7 +138,10 @@ impl Column {
 
     /// Compared with the true gap.
     const fn of_gap(self) -> Self {
-        Self { truth: Some((|c| c.gap_mm, gap_error)), ..self }
+        let error = |error, truth| {
+            format!("{} µm, {} %", signed(1e3 * error, 0), signed(100.0 * error / truth, 1))
+        };
+        Self { truth: Some((|c| c.gap_mm, error)), ..self }
     }
 
     const fn off_terminal(self) -> Self {
@@ -160,7 +163,7 @@ pub(crate) const COLUMNS: [Column; 13] = [
     Column::new("slip", "mm", 2, |c| Some(c.slip_mm)).off_terminal(),
     Column::new("step at", "mm", 2, |c| Some(c.step_mm)),
     Column {
-        truth: Some((|c| c.step_mm, step_error)),
+        truth: Some((|c| c.step_mm, |error, _| format!("{} µm", signed(1e3 * error, 0)))),
         ..Column::new("found at", "mm", 2, |c| c.step_found_mm).off_terminal()
     },
     Column::new("touch to lift", "s", 3, |c| Some((c.lift_s - c.touch_s).abs())).off_terminal(),
@@ -177,14 +180,6 @@ pub(crate) fn slowed_by(line: &CrossingLine) -> &'static str {
         Some(LimitedBy::LeastSpeed) => "least speed",
         Some(LimitedBy::Drive) => "drive speed",
     }
-}
-
-fn gap_error(error: f64, truth: f64) -> String {
-    format!("{} µm, {} %", signed(1e3 * error, 0), signed(100.0 * error / truth, 1))
-}
-
-fn step_error(error: f64, _: f64) -> String {
-    format!("{} µm", signed(1e3 * error, 0))
 }
 
 #[cfg(test)]
