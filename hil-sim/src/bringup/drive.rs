@@ -32,10 +32,7 @@ pub(super) fn drive(session: &mut Session<'_, '_>) -> Result<Vec<Check>, Bringup
         Ok(ControlFlow::Continue(()))
     })?;
     let (bridge, silent) = bridge(&slow, 0, SLOW);
-    let mut checks = vec![bridge];
-    if silent {
-        checks = vec![silent_bridge(session, &slow)?];
-    }
+    let mut checks = vec![if silent { silent_bridge(session, &slow)? } else { bridge }];
     if !checks[0].ok {
         return Ok(checks);
     }

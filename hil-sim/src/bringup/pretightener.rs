@@ -73,10 +73,8 @@ pub(super) fn pretightener(session: &mut Session<'_, '_>) -> Result<Vec<Check>, 
     }
     let change = Level::of(&first.rows, &scale).since(base);
     (session.say)(&format!("  {}", change.text()));
-    let rises = rises(session, &first, change, base, &scale)?;
-    let good = rises.ok;
-    checks.push(rises);
-    if !good {
+    checks.push(rises(session, &first, change, base, &scale)?);
+    if checks.iter().any(|check| !check.ok) {
         release(session, base, &scale, STEPS_MS[0])?;
         return Ok(checks);
     }

@@ -117,10 +117,8 @@ pub(super) fn sensors(session: &mut Session<'_, '_>) -> Result<Vec<Check>, Bring
     for (sensor, place, name) in
         [(Sensor::Preload, 1, "preload lead"), (Sensor::Compression, 2, "compression lead")]
     {
-        let found = lead(session, sensor, place, name)?;
-        let good = found.ok;
-        checks.push(found);
-        if !good {
+        checks.push(lead(session, sensor, place, name)?);
+        if checks.iter().any(|check| !check.ok) {
             session.line.reset()?;
             return Ok(checks);
         }
