@@ -186,13 +186,11 @@ mod tests {
             runs.fetch_add(1, Ordering::Relaxed);
         };
         let scenario = Scenario::default();
-        let campaign = campaign(&scenario, vec![1], Some(oracle::Effort::Coarse)).unwrap();
+        let campaign = campaign(&scenario, vec![1], Some(oracle::Effort::COARSE)).unwrap();
         let most = campaign.steps.1 * campaign.cases.len();
         let comparison = campaign.complete(&count).unwrap();
         let runs = runs.into_inner();
         assert!((STRATEGIES.len()..=most).contains(&runs), "{runs}");
-        let names: Vec<_> = comparison.entries.iter().map(|entry| &*entry.controller).collect();
-        assert_eq!(names, ["scheduled", "constant", "limit", "reactive", "oracle"]);
         for entry in &comparison.entries {
             let off = entry.worst_gap_mm.unwrap() / comparison.gap_ref_mm - 1.0;
             assert!(!entry.tuned || entry.controller == ORACLE || off.abs() < 0.005, "{entry:?}");

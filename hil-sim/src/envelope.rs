@@ -95,15 +95,12 @@ impl Envelope {
     /// without slip; none without such a cell.
     pub(crate) fn time_ratio(&self, controller: ControllerKind, known: bool) -> Option<f64> {
         let good = || self.cells.iter().filter(move |cell| cell.known == known && cell.good());
-        let of = |cell: &Cell, kind| cell.controller == kind;
-        let ratios: Vec<f64> = good()
-            .filter(|cell| of(cell, controller))
-            .filter_map(|cell| {
-                let scheduled = ControllerKind::Scheduled;
-                let own = good().find(|own| of(own, scheduled) && own.same_place(cell))?;
-                Some(cell.duration_s? / own.duration_s?)
-            })
-            .collect();
+        let of = |kind| good().filter(move |cell| cell.controller == kind);
+        let ratio = |cell: &Cell| {
+            let own = of(ControllerKind::Scheduled).find(|own| own.same_place(cell))?;
+            Some(cell.duration_s? / own.duration_s?)
+        };
+        let ratios: Vec<f64> = of(controller).filter_map(ratio).collect();
         (!ratios.is_empty()).then(|| ratios.iter().sum::<f64>() / ratios.len() as f64)
     }
 }
@@ -127,8 +124,8 @@ pub fn campaign(
         }
     }
     // All strategies or none at a place, so that those of an interrupted campaign compare.
-    let run = |&(known, friction, load_n): &Place, watch: Watch| {
-        let cells = STRATEGIES.map(|kind| cell(scenario, known, friction, load_n, kind));
+    let run = |place: &Place, watch: Watch| {
+        let cells = STRATEGIES.map(|kind| cell(scenario, *place, kind));
         (watch.done)();
         Ok(Some(cells.to_vec()))
     };
@@ -141,15 +138,9 @@ pub fn campaign(
     Ok(Campaign { steps: ("places", 1), cases, run: Box::new(run), fold: Box::new(fold) })
 }
 
-fn cell(
-    scenario: &Scenario,
-    known: bool,
-    friction: f64,
-    load_n: f64,
-    kind: ControllerKind,
-) -> Cell {
+fn cell(scenario: &Scenario, (known, friction, load_n): Place, controller: ControllerKind) -> Cell {
     let mut scenario = scenario.clone();
-    scenario.run.controller = kind;
+    scenario.run.controller = controller;
     if known {
         let loads = &mut scenario.rig.plant;
         (loads.mu, loads.top_load_n, loads.top_load_share) = (friction, load_n, 1.0);
@@ -169,7 +160,7 @@ fn cell(
         friction,
         load_n,
         known,
-        controller: kind,
+        controller,
         completed,
         slip_mm: summary.as_ref().map(|summary| summary.slip_mm),
         duration_s: summary.and_then(|summary| summary.duration_s).filter(|_| completed),

@@ -15,9 +15,8 @@ use sensor::FaultySensor;
 use crate::plant::rig::{Drives, Truth, VirtualRig};
 use crate::scenario::injection::{Injection, Kind, Onset, Target};
 use crate::scenario::{Direction, Scenario};
+use crate::session::TICK_S;
 
-/// Control period, s.
-const TICK_S: f64 = 1e-3;
 /// Difference of duty from which on a fault acts.
 const ACTS: f64 = 0.02;
 /// Difference of duty from which on the readback must show the fault: its tolerance band, and
@@ -134,8 +133,10 @@ impl FaultInjector {
         let first = |time: fn(&Active) -> Option<f64>| {
             self.faults.iter().filter_map(time).min_by(f64::total_cmp)
         };
-        let shows =
-            |fault: &Active| if fault.is_in_bridge() { fault.shows_s } else { fault.acts_s() };
+        let shows = |fault: &Active| {
+            let in_bridge = fault.is_of_actuator() && fault.injection.kind.is_in_bridge();
+            if in_bridge { fault.shows_s } else { fault.acts_s() }
+        };
         FaultTimes {
             struck_s: first(|fault| fault.since_s),
             acts_s: first(Active::acts_s),
@@ -271,7 +272,10 @@ impl FaultInjector {
 
     /// Damages the plant.
     pub fn plant(&mut self, plant: &mut VirtualRig) {
-        if !self.faults.iter().any(|fault| fault.damages()) {
+        use Target::{Load, Spring, Tread, Wheel};
+        let damages =
+            |fault: &Active| matches!(fault.injection.target, Wheel | Tread | Spring | Load);
+        if !self.faults.iter().any(damages) {
             return;
         }
         let p = plant.parameters();
@@ -282,15 +286,15 @@ impl FaultInjector {
             let active = fault.is_active();
             let part = if active { fault.injection.magnitude() } else { 1.0 };
             match (fault.injection.target, fault.injection.kind) {
-                (Target::Wheel, Kind::Slip) => plant.set_friction(mu * part),
-                (Target::Load, Kind::Doubled) => plant.set_load(load_n * part),
-                (Target::Tread, Kind::Torn) => {
+                (Wheel, Kind::Slip) => plant.set_friction(mu * part),
+                (Load, Kind::Doubled) => plant.set_load(load_n * part),
+                (Tread, Kind::Torn) => {
                     let near = (turned - fault.torn_rad).abs() < TORN_RAD;
                     let part = if near { part } else { 1.0 };
                     plant.set_stiffness(k_inf * part, k_0 * part);
                 }
                 // A broken spring does not heal.
-                (Target::Spring, Kind::Broken) if active && fault.kept.is_none() => {
+                (Spring, Kind::Broken) if active && fault.kept.is_none() => {
                     fault.kept = Some(part);
                     plant.break_spring(part);
                 }
@@ -316,17 +320,8 @@ impl Active {
         matches!(self.injection.target, Target::Drive | Target::Pretightener)
     }
 
-    const fn is_in_bridge(&self) -> bool {
-        self.is_of_actuator() && self.injection.kind.is_in_bridge()
-    }
-
     const fn acts_s(&self) -> Option<f64> {
         if self.is_of_actuator() { self.acts_s } else { self.since_s }
-    }
-
-    const fn damages(&self) -> bool {
-        use Target::{Load, Spring, Tread, Wheel};
-        matches!(self.injection.target, Wheel | Tread | Spring | Load)
     }
 
     /// What a bridge leaves of a duty that keeps the motor's current, the duty beyond its speed, to

@@ -77,7 +77,8 @@ impl RunLine {
         let gaps = || crossings.iter().map(|c| over_ref(c.gap_mm));
         let referred = summary.gap_ref_mm > 0.0;
         let completed = summary.completed && summary.faults.is_empty();
-        let reported = !summary.faults.is_empty() || limits.iter().any(|code| reports_end(*code));
+        let reported =
+            !summary.faults.is_empty() || limits.iter().any(|code| REPORT_END.contains(code));
         let called_complete = summary.faults.is_empty() && summary.cut_off_s.is_none();
         let found = |c: &CrossingLine| Some((c.index, (c.step_found_mm? - c.step_mm).abs()));
         Self {
@@ -109,12 +110,9 @@ impl RunLine {
     }
 }
 
-/// Whether a limit says that the run does not end where it should.
-fn reports_end(code: u16) -> bool {
-    [Limit::StepMissing, Limit::PositionUnconfirmed, Limit::EndOverrun]
-        .iter()
-        .any(|limit| limit.code() == code)
-}
+/// Codes of the limits that say that the run does not end where it should.
+const REPORT_END: [u16; 3] =
+    [Limit::StepMissing.code(), Limit::PositionUnconfirmed.code(), Limit::EndOverrun.code()];
 
 /// Slip that is named wrong by more than this, mm, and by more than this part of it; distance from
 /// the end, mm; and gap over the reference, from which a run that names none of them is wrong in

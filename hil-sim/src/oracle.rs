@@ -18,8 +18,6 @@ mod drive;
 mod leg;
 pub mod pattern;
 
-use interstage::rig::Rig;
-
 use crate::montecarlo::RunLine;
 use crate::report::verdict::SLIP_SEEN_MM;
 use crate::scenario::{Direction, Scenario};
@@ -31,34 +29,20 @@ use pattern::pattern_search;
 /// Cost of a leg that breaks a bound, s, beside that of by how much.
 const BROKEN_S: f64 = 100.0;
 
-/// Distances before and behind the event, mm, from which the search of a leg starts.
-const STARTS: [(f64, f64); 3] = [(0.8, 0.2), (0.8, -0.5), (0.4, -0.3)];
-
 /// How thoroughly the oracle searches.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Effort {
-    /// One start, one halving of the search's steps: for tests.
-    Coarse,
-    /// Until more no longer matters.
-    Full,
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Effort {
+    /// Halvings of the pattern search.
+    halvings: usize,
+    /// Distances before and behind the event, mm, from which the search of a leg starts.
+    starts: &'static [(f64, f64)],
 }
 
 impl Effort {
-    /// Halvings of the pattern search.
-    const fn halvings(self) -> usize {
-        match self {
-            Self::Coarse => 1,
-            Self::Full => 4,
-        }
-    }
-
-    /// Where the search of a leg starts.
-    fn starts(self) -> &'static [(f64, f64)] {
-        match self {
-            Self::Coarse => &STARTS[..1],
-            Self::Full => &STARTS,
-        }
-    }
+    /// One start, one halving of the search's steps: for tests.
+    pub const COARSE: Self = Self { halvings: 1, starts: &[(0.8, 0.2)] };
+    /// Until more no longer matters.
+    pub const FULL: Self = Self { halvings: 4, starts: &[(0.8, 0.2), (0.8, -0.5), (0.4, -0.3)] };
 }
 
 /// Most runs of a leg for one crossing speed.
@@ -106,8 +90,8 @@ pub fn search(scenario: &Scenario, bounds: &Bounds, effort: Effort) -> Result<Or
     let mut driven = Driven::new(plant, limits);
     let mut legs: Vec<Leg> = Vec::new();
     let mut fails = None;
-    for index in 0..track.len() {
-        let search = LegSearch { track: &track, from: &driven, index, rig, effort };
+    for index in 0..track.events.len() {
+        let search = LegSearch { track: &track, from: &driven, index, effort };
         let (leg, reached) = search.best(legs.last())?;
         fails = reached.fails().map(|(bound, by)| {
             format!("step {} of the run: {bound} broken by {:.3} %", index + 1, 100.0 * by)
@@ -152,7 +136,6 @@ struct LegSearch<'a> {
     track: &'a Track<'a>,
     from: &'a Driven,
     index: usize,
-    rig: &'a Rig,
     effort: Effort,
 }
 
@@ -161,14 +144,14 @@ impl LegSearch<'_> {
     /// the leg before.
     fn best(&self, before: Option<&Leg>) -> Result<(Leg, Reached), RunError> {
         let fresh = |&(before_mm, after_mm): &(f64, f64)| Leg {
-            speed_mm_s: self.rig.control.safe_speed_mm_s,
+            speed_mm_s: self.track.rig.control.safe_speed_mm_s,
             before_mm,
             after_mm,
-            preload_n: 0.98 * self.rig.preload.limit_n,
+            preload_n: 0.98 * self.track.rig.preload.limit_n,
             start_s: 0.0,
         };
         let warm = before.map(|leg| Leg { start_s: 0.0, ..*leg });
-        let starts = warm.into_iter().chain(self.effort.starts().iter().map(fresh));
+        let starts = warm.into_iter().chain(self.effort.starts.iter().map(fresh));
         let mut best: Option<(Leg, Reached)> = None;
         for leg in starts {
             let found = self.improve(leg)?;
@@ -181,7 +164,7 @@ impl LegSearch<'_> {
 
     /// The best leg that the search finds from this one.
     fn improve(&self, mut leg: Leg) -> Result<(Leg, Reached), RunError> {
-        let (limit, slew) = (self.rig.preload.limit_n, self.rig.preload.slew_n_per_s);
+        let (limit, slew) = (self.track.rig.preload.limit_n, self.track.rig.preload.slew_n_per_s);
         let mut reached = self.cross(&mut leg)?;
         // The first leg waits for the preload; about how long is found first.
         let rise_s = (leg.preload_n - self.from.plant.truth().preload_n).max(0.0) / slew;
@@ -196,7 +179,7 @@ impl LegSearch<'_> {
         let steps = [0.4, 0.3, 0.01 * limit, if waits { 0.1 * rise_s } else { 0.0 }];
         let mut best = (leg, reached);
         let mut failed = None;
-        pattern_search(&steps, self.effort.halvings(), |changes| {
+        pattern_search(&steps, self.effort.halvings, |changes| {
             let mut tried = best.0.changed(changes, limit);
             match self.cross(&mut tried) {
                 Ok(found) if found.cost() < best.1.cost() => best = (tried, found),
@@ -213,22 +196,19 @@ impl LegSearch<'_> {
 
     /// Runs the leg with the largest crossing speed that keeps the gap, near its own.
     fn cross(&self, leg: &mut Leg) -> Result<Reached, RunError> {
-        let drive = &self.rig.drive;
+        let drive = &self.track.rig.drive;
         let range = (drive.min_crossing_speed_mm_s, drive.cruise_speed_mm_s);
         let mut best: Option<(f64, Reached)> = None;
-        let run =
-            |speed_mm_s: f64| self.track.run(self.from, self.index, &Leg { speed_mm_s, ..*leg });
-        let found = pattern::largest_below(range, leg.speed_mm_s, TRIES, |speed| {
-            let reached = run(speed)?;
+        pattern::largest_below(range, leg.speed_mm_s, TRIES, |speed_mm_s| {
+            let reached = self.track.run(self.from, self.index, &Leg { speed_mm_s, ..*leg })?;
             let excess = reached.gap_excess;
             if best.as_ref().is_none_or(|(_, best)| reached.cost() < best.cost()) {
-                best = Some((speed, reached));
+                best = Some((speed_mm_s, reached));
             }
             Ok::<f64, RunError>(excess)
-        });
-        found?;
-        let (speed, reached) = best.expect("at least one run was made");
-        leg.speed_mm_s = speed;
+        })?;
+        let (speed_mm_s, reached) = best.expect("at least one run was made");
+        leg.speed_mm_s = speed_mm_s;
         Ok(reached)
     }
 }
@@ -237,18 +217,14 @@ impl LegSearch<'_> {
 mod tests {
     use super::*;
 
-    /// What a run of the nominal prototype reaches with any strategy.
-    fn bounds() -> Bounds {
-        Bounds { gap_mm: 2.6, slip_margin: 0.2 }
-    }
-
     #[test]
     fn the_best_run_keeps_its_bounds_and_its_actuators() {
+        // What a run of the nominal prototype reaches with any strategy.
         for (direction, gap_mm) in [(Direction::Deploy, 2.6), (Direction::Retract, 2.32)] {
             let mut scenario = Scenario::default();
             scenario.run.direction = direction;
-            let bounds = Bounds { gap_mm, ..bounds() };
-            let run = search(&scenario, &bounds, Effort::Coarse).unwrap();
+            let bounds = Bounds { gap_mm, slip_margin: 0.2 };
+            let run = search(&scenario, &bounds, Effort::COARSE).unwrap();
             let line = &run.line;
             assert!(line.completed, "{line:?}");
             assert!(line.max_gap_mm <= gap_mm && line.slip_events == 0, "{line:?}");
@@ -264,8 +240,8 @@ mod tests {
     #[test]
     fn more_room_is_no_slower_and_no_room_does_not_complete() {
         let duration = |gap_mm| {
-            let bounds = Bounds { gap_mm, ..bounds() };
-            let line = search(&Scenario::default(), &bounds, Effort::Coarse).unwrap().line;
+            let bounds = Bounds { gap_mm, slip_margin: 0.2 };
+            let line = search(&Scenario::default(), &bounds, Effort::COARSE).unwrap().line;
             line.duration_s.filter(|_| line.completed)
         };
         let [narrow, wide] = [2.58, 2.68].map(|gap| duration(gap).expect("possible"));

@@ -32,10 +32,7 @@ pub(super) fn drive(session: &mut Session<'_, '_>) -> Result<Vec<Check>, Bringup
         Ok(ControlFlow::Continue(()))
     })?;
     let (bridge, silent) = bridge(&slow, 0, SLOW);
-    let mut checks = vec![bridge];
-    if silent {
-        checks = vec![silent_bridge(session, &slow)?];
-    }
+    let mut checks = vec![if silent { silent_bridge(session, &slow)? } else { bridge }];
     if !checks[0].ok {
         return Ok(checks);
     }
@@ -151,42 +148,36 @@ fn turns(
             check("drive direction", seen == Seen::Outwards, eye.to_owned(), advice),
         ];
     }
+    let was_seen = matches!(seen, Seen::Outwards | Seen::Inwards);
+    let exchanged = format!(
+        "the motors are exchanged: the drive's bridge moves the pre-tightener (preload \
+         {preload_change:+.1} N)"
+    );
     let advice = if counts.sum < -20 {
         match seen {
-            Seen::Outwards => "the encoder's lines A and B are swapped".to_owned(),
-            Seen::Inwards => "the drive motor's leads are swapped".to_owned(),
-            _ => "A and B of the encoder are swapped, or the drive motor's leads: if the wheel \
-                  turns outwards, swap A (PA0) and B (PA1); if inwards, the motor's leads"
-                .to_owned(),
-        }
-    } else if preload_change.abs() > CHANGED.0 && !matches!(seen, Seen::Outwards | Seen::Inwards) {
-        format!(
-            "the motors are exchanged: the drive's bridge moves the pre-tightener (preload \
-             {preload_change:+.1} N)"
-        )
-    } else if counts.changes > 5 {
-        let stuck: Vec<&str> = ["A (PA0)", "B (PA1)"]
-            .into_iter()
-            .zip(lines)
-            .filter(|(_, seen)| *seen != [true; 2])
-            .map(|(name, _)| name)
-            .collect();
-        match stuck[..] {
-            [line] => format!("the encoder's line {line} is missing: its level never changes"),
-            _ => "the encoder's line A or B is missing: measure PA0 and PA1 while the wheel is \
-                  turned by hand; the one that does not change"
-                .to_owned(),
-        }
-    } else {
-        match seen {
-            Seen::Outwards | Seen::Inwards => {
-                "the wheel encoder is not connected: neither line changes although the wheel turns"
-                    .to_owned()
+            Seen::Outwards => "the encoder's lines A and B are swapped",
+            Seen::Inwards => "the drive motor's leads are swapped",
+            _ => {
+                "A and B of the encoder are swapped, or the drive motor's leads: if the wheel \
+                 turns outwards, swap A (PA0) and B (PA1); if inwards, the motor's leads"
             }
-            _ => "the wheel is blocked, or the drive motor's leads are open: turn the wheel by \
-                  hand; if it is free, measure the motor's resistance at the bridge"
-                .to_owned(),
         }
+    } else if preload_change.abs() > CHANGED.0 && !was_seen {
+        &exchanged
+    } else if counts.changes > 5 {
+        match lines.map(|levels| levels == [true; 2]) {
+            [false, true] => "the encoder's line A (PA0) is missing: its level never changes",
+            [true, false] => "the encoder's line B (PA1) is missing: its level never changes",
+            _ => {
+                "the encoder's line A or B is missing: measure PA0 and PA1 while the wheel is \
+                 turned by hand; the one that does not change"
+            }
+        }
+    } else if was_seen {
+        "the wheel encoder is not connected: neither line changes although the wheel turns"
+    } else {
+        "the wheel is blocked, or the drive motor's leads are open: turn the wheel by hand; if it \
+         is free, measure the motor's resistance at the bridge"
     };
-    vec![check("drive turns", false, shown, &advice)]
+    vec![check("drive turns", false, shown, advice)]
 }

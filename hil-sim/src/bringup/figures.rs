@@ -2,12 +2,11 @@
 
 use interstage::log::Record;
 use interstage::rig::Rig;
+use interstage::sense::analog::{FULL_AT, ZERO_AT};
 use interstage::sense::raw::BridgeCode;
 
-/// Part of the converter between a sensor's zero and its full scale.
-const SPAN: f64 = 0.85 * 65_535.0;
-/// Code of a sensor's zero.
-const ZERO: f64 = 0.05 * 65_535.0;
+/// Codes between a sensor's zero and its full scale.
+const SPAN: f64 = (FULL_AT - ZERO_AT) * 65_535.0;
 /// Codes of an angle sensor's turn.
 pub(super) const TURN: f64 = 16_384.0;
 
@@ -39,11 +38,11 @@ impl Scale {
     }
 
     pub(super) fn preload(&self, row: &Record) -> f64 {
-        (f64::from(row.codes[1]) - ZERO) * self.preload_n
+        (f64::from(row.codes[1]) - ZERO_AT * 65_535.0) * self.preload_n
     }
 
     pub(super) fn compression(&self, row: &Record) -> f64 {
-        (f64::from(row.codes[2]) - ZERO) * self.compression_mm
+        (f64::from(row.codes[2]) - ZERO_AT * 65_535.0) * self.compression_mm
     }
 }
 

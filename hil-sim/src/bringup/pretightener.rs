@@ -73,10 +73,8 @@ pub(super) fn pretightener(session: &mut Session<'_, '_>) -> Result<Vec<Check>, 
     }
     let change = Level::of(&first.rows, &scale).since(base);
     (session.say)(&format!("  {}", change.text()));
-    let rises = rises(session, &first, change, base, &scale)?;
-    let good = rises.ok;
-    checks.push(rises);
-    if !good {
+    checks.push(rises(session, &first, change, base, &scale)?);
+    if checks.iter().any(|check| !check.ok) {
         release(session, base, &scale, STEPS_MS[0])?;
         return Ok(checks);
     }
@@ -112,44 +110,42 @@ fn rises(
         (1, 1) if first.mode == Mode::Service => {
             return Ok(check("preload rises", true, shown, ""));
         }
-        (1, 1) => "the motion ended in a fault".to_owned(),
-        (-1, 1) => "the preload sensor's bridge is reversed: swap its two signal leads".to_owned(),
+        (1, 1) => "the motion ended in a fault",
+        (-1, 1) => "the preload sensor's bridge is reversed: swap its two signal leads",
         (1, -1) => {
             "the compression sensor is reversed: swap its signal leads, or its sense at the \
-                    amplifier"
-                .to_owned()
+             amplifier"
         }
         (0, 1) => {
-            "the preload sensor shows nothing of a preload that compresses the tread: where it \
-                   is mounted, its amplifier"
-                .to_owned()
+            "the preload sensor shows nothing of a preload that compresses the tread: where it is \
+             mounted, its amplifier"
         }
-        (1, 0) => "the compression sensor shows nothing of a preload that the other sensor shows: \
-                   where it is mounted, its amplifier"
-            .to_owned(),
-        (-1, -1) => {
-            "the pre-tightener's leads are swapped: preload and compression fall".to_owned()
+        (1, 0) => {
+            "the compression sensor shows nothing of a preload that the other sensor shows: where \
+             it is mounted, its amplifier"
         }
+        (-1, -1) => "the pre-tightener's leads are swapped: preload and compression fall",
         _ if counted(driven(first, 1)).range > 20 => {
-            "the motors are exchanged: the pre-tightener's bridge turns the wheel".to_owned()
+            "the motors are exchanged: the pre-tightener's bridge turns the wheel"
         }
         _ => {
             session.operator.confirm("Nothing moved: the PRE-TIGHTENER turns back for 1.2 s.")?;
             let back = session.line.moved(press(-PRESS), 1200, REST_MS)?;
             let change = Level::of(&back.rows, scale).since(base);
-            if change.is_none() {
+            let swapped = format!(
+                "the pre-tightener's leads are swapped: backwards it presses ({})",
+                change.text()
+            );
+            let advice = if change.is_none() {
                 "the pre-tightener does not move, or the wheel is clear of the wall: its motor's \
                  leads; turn the screw by hand until the wheel touches"
-                    .to_owned()
             } else {
-                format!(
-                    "the pre-tightener's leads are swapped: backwards it presses ({})",
-                    change.text()
-                )
-            }
+                &swapped
+            };
+            return Ok(check("preload rises", false, shown, advice));
         }
     };
-    Ok(check("preload rises", false, shown, &advice))
+    Ok(check("preload rises", false, shown, advice))
 }
 
 /// The three steps together: each time of duty, s, and the level it led to.

@@ -1,6 +1,7 @@
 //! What can be judged at rest: the board, and its sensors.
 
 use interstage::log::{Flags, Record};
+use interstage::sense::analog::{BROKEN_ABOVE, BROKEN_BELOW};
 use interstage::sense::raw::AngleFrame;
 use interstage::supervise::Mode;
 
@@ -17,9 +18,6 @@ const STOP_PINS: [(&str, u32); 2] = [("PB12", 12), ("PB7", 7)];
 const ROWS: u32 = 500;
 /// Rows after a sensor is unplugged; the later half is judged.
 const LEAD_ROWS: u32 = 100;
-/// Lowest and highest part of the converter of a sensor that is connected, as the firmware has
-/// them.
-const RANGE: (f64, f64) = (0.02, 0.98);
 /// Codes by which the angle's zero may be off: 1.5 mm of the wheel's place.
 const ZERO_CODES: f64 = 40.0;
 /// Coded age of a sensor without a reading.
@@ -108,12 +106,10 @@ pub(super) fn sensors(session: &mut Session<'_, '_>) -> Result<Vec<Check>, Bring
         table::counted(counts.range, "count"),
         "the wheel turns, or its lines pick up noise: hold it still, look at the shields",
     )];
-    let (preload, noise) = mean(rows.iter().map(|row| scale.preload(row)));
-    let name = ("preload", "PC2");
-    checks.extend(analogue(name, &rows, 1, (preload, noise), (3.0, 0.2), "N"));
-    let (compression, noise) = mean(rows.iter().map(|row| scale.compression(row)));
-    let name = ("compression", "PC3");
-    checks.extend(analogue(name, &rows, 2, (compression, noise), (0.1, 0.008), "mm"));
+    let preload = mean(rows.iter().map(|row| scale.preload(row)));
+    checks.extend(analogue(("preload", "PC2"), &rows, 1, preload, (3.0, 0.2), "N"));
+    let compression = mean(rows.iter().map(|row| scale.compression(row)));
+    checks.extend(analogue(("compression", "PC3"), &rows, 2, compression, (0.1, 0.008), "mm"));
     checks.extend(arm(session, &rows));
     if checks.iter().any(|check| !check.ok) {
         return Ok(checks);
@@ -121,10 +117,8 @@ pub(super) fn sensors(session: &mut Session<'_, '_>) -> Result<Vec<Check>, Bring
     for (sensor, place, name) in
         [(Sensor::Preload, 1, "preload lead"), (Sensor::Compression, 2, "compression lead")]
     {
-        let found = lead(session, sensor, place, name)?;
-        let good = found.ok;
-        checks.push(found);
-        if !good {
+        checks.push(lead(session, sensor, place, name)?);
+        if checks.iter().any(|check| !check.ok) {
             session.line.reset()?;
             return Ok(checks);
         }
@@ -154,9 +148,9 @@ fn analogue(
     let silent = rows.iter().all(|row| row.ages[place] == NEVER);
     let advice = if silent {
         format!("the converter gives nothing for the {name} sensor")
-    } else if code < RANGE.0 {
+    } else if code < BROKEN_BELOW {
         format!("the {name} sensor is open: its lead to {pin}, its supply, its amplifier")
-    } else if code > RANGE.1 {
+    } else if code > BROKEN_ABOVE {
         format!("the {name} sensor is at the converter's end: {pin} shorted to 3.3 V, or overload")
     } else {
         format!(
@@ -202,7 +196,7 @@ fn arm(session: &mut Session<'_, '_>, rows: &[Record]) -> Vec<Check> {
     }
     let wanted = stowed(rig);
     let off = turned(wanted, mean(good.iter().map(|row| turned(wanted, angle(row)))).0 + wanted);
-    let zero = (rig.sense.angle_zero_code + off).round().rem_euclid(16_384.0);
+    let zero = (rig.sense.angle_zero_code + off).round().rem_euclid(TURN);
     let near = off.abs() <= ZERO_CODES;
     let shown = format!("code {:.1}, {off:+.1} from {wanted:.0}", wanted + off);
     let advice = format!(
@@ -240,7 +234,7 @@ fn lead(
     }
     let (other, _) = mean(rows.iter().skip(50).map(|row| part(row.codes[3 - place])));
     let pin = if sensor == Sensor::Preload { "PC2" } else { "PC3" };
-    let advice = if code > RANGE.0 && other < RANGE.0 {
+    let advice = if code > BROKEN_BELOW && other < BROKEN_BELOW {
         "preload and compression sensor are exchanged: swap PC2 and PC3".to_owned()
     } else {
         format!(
@@ -248,39 +242,23 @@ fn lead(
              noticed"
         )
     };
-    Ok(check(name, code < RANGE.0, format!("{:.1} % of the converter", 100.0 * code), &advice))
+    Ok(check(name, code < BROKEN_BELOW, format!("{:.1} % of the converter", 100.0 * code), &advice))
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Operator, Question, Seen};
     use super::*;
-    use crate::bringup::Line;
+    use crate::bringup::{Line, Stdin};
     use crate::probe::Mute;
     use crate::scenario::Scenario;
-
-    struct Hand;
-
-    impl Operator for Hand {
-        fn confirm(&mut self, _: &str) -> Result<(), BringupError> {
-            Ok(())
-        }
-
-        fn act(&mut self, _: Action) -> Result<(), BringupError> {
-            Ok(())
-        }
-
-        fn look(&mut self, _: Question) -> Result<Seen, BringupError> {
-            Ok(Seen::Nothing)
-        }
-    }
 
     #[test]
     fn a_silent_log_proves_no_pull_down() {
         let (mut port, expected) = (Mute::new(), Scenario::default());
         let mut session = Session {
             line: &mut Line::new(&mut port),
-            operator: &mut Hand,
+            // The plug is pulled, and put in again.
+            operator: &mut Stdin::new(&b"\n\n"[..], Vec::new(), true),
             expected: &expected,
             proposed: &mut expected.clone(),
             say: &mut |_| {},

@@ -5,8 +5,6 @@ use interstage::supervise::Mode;
 
 use super::{Action, BringupError, Check, Question, Seen, Session, check};
 
-const NOBODY_LOOKED: &str = "nobody looked; run again and answer";
-
 /// Emergency stop and reset.
 pub(super) fn run(session: &mut Session<'_, '_>) -> Result<Vec<Check>, BringupError> {
     session.operator.act(Action::PressStop)?;
@@ -22,38 +20,40 @@ pub(super) fn run(session: &mut Session<'_, '_>) -> Result<Vec<Check>, BringupEr
         "the board does not see the emergency stop: its line is shorted to ground, or the contact \
          is bridged. PB12 and PB7 must be at 3.3 V while it is pressed",
     )];
-    let (measured, advice) = match supplied {
-        Seen::Yes => (
-            "the motors keep their supply",
-            "the emergency stop's second contact does not cut the motors' supply: put it in series \
-             with the supply's plus",
-        ),
-        Seen::Nothing => ("no supply", ""),
-        _ => ("not observed", NOBODY_LOOKED),
-    };
-    let good = supplied == Seen::Nothing;
-    checks.push(check("stop cuts supply", good, measured.to_owned(), advice));
+    checks.push(nothing_seen(
+        "stop cuts supply",
+        supplied,
+        ["no supply", "the motors keep their supply"],
+        "the emergency stop's second contact does not cut the motors' supply: put it in series with \
+         the supply's plus",
+    ));
     if checks.iter().any(|check| !check.ok) {
         return Ok(checks);
     }
     session.operator.act(Action::HoldReset)?;
     let moved = session.operator.look(Question::MovedInReset)?;
-    let (measured, advice) = match moved {
-        Seen::Nothing => ("nothing moved", ""),
-        Seen::Yes => (
-            "something moved",
-            "a pull-down of 4.7 kOhm at a bridge's PWM or enable line is missing (PA8, PA10, PC6, \
-             PC9): the one whose motor moved",
-        ),
-        _ => ("not observed", NOBODY_LOOKED),
-    };
-    let good = moved == Seen::Nothing;
-    checks.push(check("held in reset", good, measured.to_owned(), advice));
+    checks.push(nothing_seen(
+        "held in reset",
+        moved,
+        ["nothing moved", "something moved"],
+        "a pull-down of 4.7 kOhm at a bridge's PWM or enable line is missing (PA8, PA10, PC6, PC9): \
+         the one whose motor moved",
+    ));
     // What was found stays, whatever the probe finds of the board after its reset.
     if let Err(error) = back(session) {
         (session.say)(&format!("  after the reset: {error}"));
     }
     Ok(checks)
+}
+
+/// A check in which nothing must be seen: what is measured if so, and if not.
+fn nothing_seen(name: &str, seen: Seen, [nothing, yes]: [&str; 2], advice: &str) -> Check {
+    let (measured, advice) = match seen {
+        Seen::Nothing => (nothing, ""),
+        Seen::Yes => (yes, advice),
+        _ => ("not observed", "nobody looked; run again and answer"),
+    };
+    check(name, seen == Seen::Nothing, measured.to_owned(), advice)
 }
 
 /// Waits until the board is idle. The reset has left the fault hold as well.

@@ -40,7 +40,7 @@ pub(super) struct Args {
 pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     args.run.without("controller", "every strategy is compared")?;
     let scenario = args.run.resolve()?;
-    let effort = (!args.no_oracle).then_some(Effort::Full);
+    let effort = (!args.no_oracle).then_some(Effort::FULL);
     let campaign = compare::campaign(&scenario, scenario.seeds(args.count)?, effort)?;
     let found = args.campaign.carry_out(scenario.to_toml(), campaign)?;
     let comparison = &found.outcome;

@@ -102,16 +102,6 @@ pub struct FaultCampaign {
 pub type Rigs = Vec<(Scenario, Twin)>;
 
 impl FaultCampaign {
-    /// Runs it in software on all processors and calls `done` after each run. The outcome does
-    /// not depend on the number of processors.
-    ///
-    /// # Errors
-    /// [`RunError`] if a run without a fault cannot be made.
-    pub fn run(&self, done: &(dyn Fn() + Sync)) -> Result<Outcome, RunError> {
-        let rigs = self.rigs(twin, done)?;
-        self.on("sil", &rigs, watched).complete(done)
-    }
-
     /// Runs each rig without a fault.
     ///
     /// # Errors

@@ -14,9 +14,8 @@ use crate::plant::rig::Truth;
 use crate::plant::wall::touch_mm;
 use crate::scenario::injection::{Kind, Target, entry};
 use crate::scenario::{Scenario, StepAnomaly};
+use crate::session::TICK_S;
 
-/// Control period, s.
-const TICK_S: f64 = 1e-3;
 /// Part of its reference beyond which motion is uncommanded, and a constant, mm/s: half as
 /// fast again as asked is a wrong speed, but the one commanded.
 const BEYOND: (f64, f64) = (1.6, 3.0);
@@ -271,7 +270,6 @@ impl Judge {
 
 #[cfg(test)]
 mod tests {
-    use interstage::fault::{Fault, Limit};
     use interstage::supervise::Leg;
     use interstage::tick::Entry;
     use interstage::units::{MotorCommand, Q16};

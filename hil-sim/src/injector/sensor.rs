@@ -91,7 +91,10 @@ impl FaultySensor {
         let truth = self.code(frame);
         let Some(since_s) = since_s else {
             (self.held, self.first) = (*frame, None);
-            self.keep(t_s, truth);
+            if let Some(truth) = truth {
+                self.filtered = truth;
+                self.remember(t_s, truth);
+            }
             return;
         };
         let Some(truth) = truth else { return };
@@ -106,7 +109,8 @@ impl FaultySensor {
         }
         self.held = *frame;
         if self.kind == Kind::Garbage {
-            self.garble(frame, random);
+            let code: u16 = random.random();
+            self.put(frame, if self.target.is_readback() { code & 0xFFF } else { code });
             return;
         }
         let first = *self.first.get_or_insert(self.last.map_or(truth, |(_, code)| code));
@@ -128,14 +132,6 @@ impl FaultySensor {
         };
         self.remember(t_s, truth);
         self.write(frame, given);
-    }
-
-    /// Keeps the true reading while the sensor is intact.
-    fn keep(&mut self, t_s: f64, truth: Option<f64>) {
-        if let Some(truth) = truth {
-            self.filtered = truth;
-            self.remember(t_s, truth);
-        }
     }
 
     fn remember(&mut self, t_s: f64, truth: f64) {
@@ -204,11 +200,6 @@ impl FaultySensor {
             (Target::Encoder, _) => put(&mut frame.wheel_encoder, EncoderCount::new(code)),
             _ => {}
         }
-    }
-
-    fn garble(&self, frame: &mut SensorFrame, random: &mut ChaCha8Rng) {
-        let code: u16 = random.random();
-        self.put(frame, if self.target.is_readback() { code & 0xFFF } else { code });
     }
 
     /// Gives the sample before again.

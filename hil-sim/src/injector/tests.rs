@@ -101,13 +101,9 @@ fn a_bridge_that_is_off_stays_off() {
 }
 
 #[test]
-fn ticks_are_lost_once_and_for_as_long_as_asked() {
-    let injector = injector(Target::Tick, Kind::Overrun, 0.003);
-    assert_eq!(ticks(injector, FaultInjector::lost), (10, 3));
-}
-
-#[test]
-fn a_fault_ends_when_its_time_is_over() {
+fn ticks_are_lost_once_for_as_long_as_asked_and_a_fault_ends_when_its_time_is_over() {
+    let overrun = injector(Target::Tick, Kind::Overrun, 0.003);
+    assert_eq!(ticks(overrun, FaultInjector::lost), (10, 3));
     let hung = Injection::at(Target::Model, Kind::Hung, 0.010, 0.0);
     let injector = injecting(Injection { duration_s: Some(0.005), ..hung });
     assert_eq!(ticks(injector, FaultInjector::model_hangs), (10, 5));

@@ -37,10 +37,9 @@ pub(super) fn mismatch(scenario: &Scenario, seeds: &[u64]) -> Vec<Drawn> {
         .enumerate()
         .map(|(index, (field, neutral))| (field, neutral, range(index)))
         .filter(|(_, neutral, range)| *range != (*neutral, *neutral))
-        .map(|(field, _, (least, most))| Drawn {
-            key: format!("mismatch.{}", field.name),
-            least,
-            most,
+        .map(|(field, _, (least, most))| {
+            let key = format!("mismatch.{}", field.name);
+            Drawn { key, least, most }
         })
         .collect()
 }

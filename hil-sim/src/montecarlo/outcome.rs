@@ -216,17 +216,13 @@ mod tests {
     }
 
     #[test]
-    fn quantiles_are_figures_of_runs() {
+    fn quantiles_are_figures_of_runs_and_among_equals_name_the_lowest_seed() {
         let figures = (1..=20).map(|seed| (seed as f64, seed)).collect();
         let found = quantiles(figures).unwrap();
         assert_eq!((found.p50, found.p95, found.max, found.seed), (10.0, 19.0, 20.0, 20));
         let one = quantiles(vec![(3.0, 7)]).unwrap();
         assert_eq!((one.p50, one.p95, one.max, one.seed), (3.0, 3.0, 3.0, 7));
         assert_eq!(quantiles(Vec::new()), None);
-    }
-
-    #[test]
-    fn among_equals_the_lowest_seed_is_named() {
         assert_eq!(quantiles(vec![(1.0, 2), (1.0, 5)]).unwrap().seed, 2);
         assert_eq!(least(vec![(1.0, 5), (1.0, 2)]).unwrap().seed, 2);
     }
@@ -248,9 +244,11 @@ mod tests {
         assert_eq!(codes, [(2, Some(121)), (3, None)]);
         let limits: Vec<_> = outcome.limits.iter().map(|l| (l.code, l.runs)).collect();
         assert_eq!(limits, [(205, 2), (209, 1)]);
-        let longest = [outcome.duration_s, outcome.moving_s].map(|times| times.map(|d| d.max));
-        assert_eq!(longest, [Some(5.0), Some(4.0)]);
+        let longest = [outcome.duration_s, outcome.moving_s].map(|times| times.unwrap().max);
+        assert_eq!(longest, [5.0, 4.0]);
         assert_eq!(outcome.lead_time_s, None);
+        let none = Outcome::of(&[]);
+        assert_eq!((none.runs, none.worst_gap_mm), (0, None));
     }
 
     #[test]
@@ -265,11 +263,5 @@ mod tests {
         assert_eq!(found.iter().map(|s| (s.index, s.runs)).collect::<Vec<_>>(), [(1, 2), (3, 1)]);
         assert_eq!((found[0].off_mm.p50, found[0].off_mm.max, found[0].off_mm.seed), (0.2, 0.4, 2));
         assert_eq!(outcome.silent, [2]);
-    }
-
-    #[test]
-    fn a_campaign_without_runs_has_no_figures() {
-        let outcome = Outcome::of(&[]);
-        assert_eq!((outcome.runs, outcome.worst_gap_mm), (0, None));
     }
 }

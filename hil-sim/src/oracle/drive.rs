@@ -84,7 +84,9 @@ impl Driven {
 
     /// Time that the speed still missing to cruise costs behind this place, s.
     pub(super) fn missing_speed_s(&self) -> f64 {
-        self.limits.missing_speed_s(self.motion)
+        let Limits { cruise_mm_s, acceleration, .. } = self.limits;
+        let missing = (cruise_mm_s - self.motion.speed).max(0.0);
+        missing * missing / (2.0 * acceleration * cruise_mm_s)
     }
 
     /// To the end of travel; whether it gets there.
@@ -236,12 +238,6 @@ impl Limits {
             end_mm: if forward { rig.rig.travel_mm } else { 0.0 },
             longest_s: longest_s(rig),
         }
-    }
-
-    /// Time that the speed still missing to cruise costs behind a place, s.
-    pub(super) fn missing_speed_s(&self, now: Motion) -> f64 {
-        let missing = (self.cruise_mm_s - now.speed).max(0.0);
-        missing * missing / (2.0 * self.acceleration * self.cruise_mm_s)
     }
 
     /// Distance of a jerk-limited change of speed with this acceleration at its start, mm. One

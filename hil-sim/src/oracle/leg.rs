@@ -49,13 +49,11 @@ impl Leg {
 
 /// The steps of a plant along the run, and what must be kept.
 pub(super) struct Track<'a> {
+    pub(super) rig: &'a Rig,
     /// Coordinates of the events, ascending, mm.
-    events: Vec<f64>,
+    pub(super) events: Vec<f64>,
     limits: Limits,
     bounds: &'a Bounds,
-    limit_n: f64,
-    /// Friction left unused on the continuous wall.
-    rolling_margin: f64,
     mu: f64,
 }
 
@@ -87,7 +85,7 @@ impl Reached {
 
 impl<'a> Track<'a> {
     pub(super) fn new(
-        rig: &Rig,
+        rig: &'a Rig,
         plant: &PlantParameters,
         bounds: &'a Bounds,
         limits: Limits,
@@ -99,19 +97,7 @@ impl<'a> Track<'a> {
         let mut events: Vec<f64> =
             steps.map(|step| limits.sign * (step.position_mm - face_mm)).collect();
         events.sort_by(f64::total_cmp);
-        Self {
-            events,
-            limits,
-            bounds,
-            limit_n: rig.preload.limit_n,
-            rolling_margin: rig.control.slip_margin,
-            mu: plant.mu,
-        }
-    }
-
-    /// Number of steps.
-    pub(super) const fn len(&self) -> usize {
-        self.events.len()
+        Self { rig, events, limits, bounds, mu: plant.mu }
     }
 
     /// Runs one leg from this state.
@@ -133,14 +119,16 @@ impl<'a> Track<'a> {
         let peaks = driven.peaks;
         let used = crossing.map_or(self.mu, |crossing| crossing.peak_utilisation);
         let over = |value: f64, most: f64| (value / most - 1.0).max(0.0);
-        let legs_left = (self.len() - 1 - index) as f64;
+        let legs_left = (self.events.len() - 1 - index) as f64;
+        let most_n = self.rig.preload.limit_n * (1.0 - HANDED_OVER * legs_left);
+        let rolling_margin = self.rig.control.slip_margin;
         // A crossing that was not made breaks as much as a gap ten times as large.
         let gap_excess = (gap / self.bounds.gap_mm - 1.0).min(10.0);
         let broken = [
             ("gap", gap_excess.max(0.0)),
             ("slip margin", over(used, self.mu - self.bounds.slip_margin)),
-            ("rolling margin", over(peaks.rolling_utilisation, self.mu - self.rolling_margin)),
-            ("preload", over(peaks.preload_n, self.limit_n * (1.0 - HANDED_OVER * legs_left))),
+            ("rolling margin", over(peaks.rolling_utilisation, self.mu - rolling_margin)),
+            ("preload", over(peaks.preload_n, most_n)),
             ("separation", over(peaks.separation_mm, self.bounds.gap_mm)),
             ("slip", over(plant.truth().slip_mm, SLIP_SEEN_MM)),
         ];

@@ -83,8 +83,8 @@ length, the hub and the screw are only drawn. A click in a plot goes to its inst
 /// Both instants of a crossing as still pictures.
 fn stills(scene: &Scene, c: &Event) -> String {
     let at = |t_s: f64| {
-        let place = scene.rows.partition_point(|row| row[0] < t_s).min(scene.rows.len() - 1);
-        (scene.rows[place][1], scene.geometry.wall_radius_mm - scene.rows[place][2])
+        let [_, position, radius, ..] = scene.row(t_s);
+        (*position, scene.geometry.wall_radius_mm - radius)
     };
     let names = if scene.retracts {
         ["The edge takes the load", "The lower wall carries again"]
@@ -135,8 +135,7 @@ fn still(g: &Geometry, c: &Event, (x, y): (f64, f64), title: &str, gap: Option<f
 
 #[cfg(test)]
 mod tests {
-    use std::io::Write as _;
-    use std::process::{Command, Stdio};
+    use std::process::Command;
 
     use super::*;
     use crate::report::example;
@@ -165,16 +164,6 @@ mod tests {
     /// Runs the script's own functions where there is a `node`.
     #[test]
     fn the_script_draws_the_geometry_of_the_rig() {
-        let spawned = Command::new("node")
-            .args(["--input-type=commonjs", "-"])
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn();
-        let Ok(mut node) = spawned else {
-            eprintln!("left out: there is no node");
-            return;
-        };
         let recording = example::deploy();
         let scene = Scene::new(&recording).unwrap();
         let times = scene.crossings.iter().flat_map(|c| [c.touch_s, c.lift_s]);
@@ -198,8 +187,13 @@ current(scene, t).index];\n\
             before[0] + 0.3 * (behind[0] - before[0]),
             behind[7],
         );
-        node.stdin.take().unwrap().write_all(program.as_bytes()).unwrap();
-        let done = node.wait_with_output().unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("scene.cjs");
+        std::fs::write(&path, program).unwrap();
+        let Ok(done) = Command::new("node").arg(&path).output() else {
+            eprintln!("left out: there is no node");
+            return;
+        };
         assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
         let out: Vec<Vec<f64>> = serde_json::from_slice(&done.stdout).unwrap();
         assert_eq!(out.len(), 6);

@@ -120,10 +120,4 @@ mod tests {
         assert!(high > low);
         assert_eq!(padded((0.0, 10.0), 0.1), (-1.0, 11.0));
     }
-
-    #[test]
-    fn zero_has_no_sign() {
-        assert_eq!(label(-0.001, 1), "0.0");
-        assert_eq!(label(-0.2, 1), "-0.2");
-    }
 }

@@ -156,8 +156,7 @@ fn panels(runs: &[(&str, &Recording)]) -> Vec<Panel> {
     let line = |of: &dyn Fn(&Tick) -> f64| -> Vec<Line> {
         let all = views.iter().zip(runs).zip(LOOKS);
         all.map(|((view, (name, _)), (colour, width, _))| {
-            let points = view.rows.iter().map(|row| (row.controller.t_s, of(row))).collect();
-            Line { name: (*name).to_owned().into(), look: Look::Other(colour, width), points }
+            view.line((*name).to_owned(), Look::Other(colour, width), of)
         })
         .collect()
     };
@@ -178,7 +177,7 @@ fn panels(runs: &[(&str, &Recording)]) -> Vec<Panel> {
         ..views[0].panel(title, y_name)
     };
     let mut preload = panel("Preload", "preload, N", &|row| row.controller.preload_n);
-    preload.levels = views[0].limit_n.iter().map(|&n| ("preload limit", Look::Limit, n)).collect();
+    preload.levels = views[0].limit.into_iter().collect();
     let speed = panel("Speed", "speed, mm/s", &|row| {
         row.known(|t| t.speed_true_mm_s, |c| c.wheel_speed_mm_s)
     });

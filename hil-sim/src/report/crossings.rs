@@ -53,12 +53,10 @@ fn panels(view: &View) -> Vec<Panel> {
     let mut clearance = view.gap();
     clearance.title = "Clearance at the step root".to_owned();
     let mut forces = view.panel("Forces of corner and wall", "force, N");
-    forces.lines = vec![
-        view.line("corner", Look::Truth, |row| row.of_truth(|t| t.corner_force_n)),
-        view.line("wall", Look::Other(palette::FLOOR, 2.0), |row| {
-            row.of_truth(|t| t.floor_force_n)
-        }),
-    ];
+    forces.lines = view.lines([
+        ("corner", Look::Truth, |row| row.of_truth(|t| t.corner_force_n)),
+        ("wall", Look::Other(palette::FLOOR, 2.0), |row| row.of_truth(|t| t.floor_force_n)),
+    ]);
     let mut preload = view.preload();
     // The limit may be far above; it is in the plot of the run.
     let shown = preload.lines.iter().flat_map(|line| &line.points).map(|point| point.1);

@@ -1,12 +1,13 @@
 //! Lines with no more points than a picture can show.
 
-/// A line as pieces without gaps.
-pub(super) type Pieces = Vec<Vec<(f64, f64)>>;
-
-/// The points within `x`, broken where one is outside or not finite, with at most four points in
-/// each of `columns` columns: the first, the lowest, the highest and the last, so that no peak is
-/// lost.
-pub(super) fn decimate(points: &[(f64, f64)], x: (f64, f64), columns: usize) -> Pieces {
+/// The points within `x` as pieces, broken where one is outside or not finite, with at most four
+/// points in each of `columns` columns: the first, the lowest, the highest and the last, so that no
+/// peak is lost.
+pub(super) fn decimate(
+    points: &[(f64, f64)],
+    x: (f64, f64),
+    columns: usize,
+) -> Vec<Vec<(f64, f64)>> {
     let width = (x.1 - x.0) / columns.max(1) as f64;
     let column = |point: &(f64, f64)| ((point.0 - x.0) / width) as i64;
     let shown = |point: &(f64, f64)| (x.0..=x.1).contains(&point.0) && point.1.is_finite();
@@ -45,15 +46,11 @@ mod tests {
     }
 
     #[test]
-    fn missing_and_outside_values_break_the_line() {
+    fn missing_and_outside_values_break_the_line_and_one_that_turns_back_keeps_its_order() {
         let points =
             [(0.0, 1.0), (1.0, f64::NAN), (2.0, 1.0), (3.0, f64::INFINITY), (4.0, 2.0), (9.0, 1.0)];
         let pieces = decimate(&points, (0.0, 5.0), 10);
         assert_eq!(pieces, [vec![(0.0, 1.0)], vec![(2.0, 1.0)], vec![(4.0, 2.0)]]);
-    }
-
-    #[test]
-    fn a_line_that_turns_back_keeps_its_order() {
         let points = [(0.0, 0.0), (5.0, 1.0), (0.0, 2.0)];
         assert_eq!(decimate(&points, (0.0, 10.0), 10), [points.to_vec()]);
     }

@@ -23,7 +23,6 @@ const RULES: f64 = 16.0;
 const RULE_PX: f64 = 11.0;
 /// Below the plot: labels of the ticks and the name of the axis.
 const BELOW: f64 = 38.0;
-const GRID: &str = "#e9ebef";
 
 /// What a line shows.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -237,7 +236,9 @@ data-least=\"{least}\"{}>\n<figcaption><b>{}</b><output></output>{legend}</figca
                 "<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\"{more}>{text}</text>\n"
             )
         };
-        let grid = |d: String| format!("<path class=\"grid\" stroke=\"{GRID}\" d=\"{d}\"/>\n");
+        let grid = |d: String| {
+            format!("<path class=\"grid\" stroke=\"{}\" d=\"{d}\"/>\n", hex(palette::GRID))
+        };
         let mut axes = String::new();
         let (ticks, decimals) = axis::ticks(x, (wide / 75.0).max(2.0) as usize);
         for tick in ticks {

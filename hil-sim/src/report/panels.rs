@@ -1,9 +1,12 @@
 //! The plots of a run, over time or over position.
 
+use std::borrow::Cow;
+
 use plotters::style::RGBColor;
 
 use super::axis;
 use super::palette;
+use super::panel::Look::{Limit, Measured, Truth, Wanted};
 use super::panel::{Line, Look, Marks, Panel, Rule, Shape, stacked};
 use super::verdict::GAP_TOLERANCE;
 use crate::record::{CrossingLine, Recording, Report, Tick};
@@ -53,16 +56,6 @@ impl Across {
         }
     }
 
-    /// Name of the time axis in the page's script.
-    pub(super) fn axis(self) -> &'static str {
-        if self == Self::Position { "position" } else { "time" }
-    }
-
-    /// Time at the axis' zero, s.
-    pub(super) fn since_s(self) -> f64 {
-        if let Self::Since(start_s) = self { start_s } else { 0.0 }
-    }
-
     /// Range of the rows. Over time it begins at zero, the command, if they go beyond.
     pub(super) fn range(self, rows: &[Tick]) -> (f64, f64) {
         let (low, high) = axis::extent(rows.iter().map(|row| self.of(row))).unwrap_or((0.0, 1.0));
@@ -76,6 +69,9 @@ impl Across {
     }
 }
 
+/// A field of the rows, as a line with its name and look.
+type Field = (&'static str, Look, fn(&Tick) -> f64);
+
 /// The run as the plots need it.
 pub(super) struct View<'a> {
     pub(super) recording: &'a Recording,
@@ -85,8 +81,8 @@ pub(super) struct View<'a> {
     pub(super) shades: Vec<(f64, f64, String)>,
     /// First touches, faces, faults and limits.
     pub(super) rules: Vec<Rule>,
-    /// Largest preload, N, if the parameters have it.
-    pub(super) limit_n: Option<f64>,
+    /// Level of the largest preload, N, if the parameters have it.
+    pub(super) limit: Option<(&'static str, Look, f64)>,
 }
 
 impl<'a> View<'a> {
@@ -111,7 +107,7 @@ impl<'a> View<'a> {
                 .flat_map(|c| rules(rows, across, c))
                 .chain(reports(recording, across))
                 .collect(),
-            limit_n: parameters.ok().map(|scenario| scenario.rig.preload.limit_n),
+            limit: parameters.ok().map(|p| ("preload limit", Limit, p.rig.preload.limit_n)),
         }
     }
 
@@ -129,9 +125,19 @@ impl<'a> View<'a> {
     }
 
     /// A line of one field.
-    pub(super) fn line(&self, name: &'static str, look: Look, of: impl Fn(&Tick) -> f64) -> Line {
+    pub(super) fn line(
+        &self,
+        name: impl Into<Cow<'static, str>>,
+        look: Look,
+        of: impl Fn(&Tick) -> f64,
+    ) -> Line {
         let points = self.rows.iter().map(|row| (self.across.of(row), of(row))).collect();
         Line { name: name.into(), look, points }
+    }
+
+    /// Lines of these fields.
+    pub(super) fn lines<const N: usize>(&self, fields: [Field; N]) -> Vec<Line> {
+        fields.map(|(name, look, of)| self.line(name, look, of)).into()
     }
 
     /// Marks at lift-off of the crossings that have the value.
@@ -166,23 +172,21 @@ impl<'a> View<'a> {
     }
 
     pub(super) fn speed(&self) -> Panel {
-        let lines = vec![
-            self.line("reference", Look::Wanted, |row| row.controller.speed_ref_mm_s),
-            self.line("estimated", Look::Measured(palette::SPEED), |row| {
-                row.controller.wheel_speed_mm_s
-            }),
-            self.line("true", Look::Truth, |row| row.of_truth(|t| t.speed_true_mm_s)),
-        ];
+        let lines = self.lines([
+            ("reference", Wanted, |row| row.controller.speed_ref_mm_s),
+            ("estimated", Measured(palette::SPEED), |row| row.controller.wheel_speed_mm_s),
+            ("true", Truth, |row| row.of_truth(|t| t.speed_true_mm_s)),
+        ]);
         Panel { least_span: 2.0, lines, ..self.panel("Speed", "speed, mm/s") }
     }
 
     pub(super) fn preload(&self) -> Panel {
-        let lines = vec![
-            self.line("reference", Look::Wanted, |row| row.controller.preload_ref_n),
-            self.line("measured", Look::Measured(palette::PRELOAD), |row| row.controller.preload_n),
-            self.line("true", Look::Truth, |row| row.of_truth(|t| t.preload_true_n)),
-        ];
-        let levels = self.limit_n.iter().map(|&n| ("preload limit", Look::Limit, n)).collect();
+        let lines = self.lines([
+            ("reference", Wanted, |row| row.controller.preload_ref_n),
+            ("measured", Measured(palette::PRELOAD), |row| row.controller.preload_n),
+            ("true", Truth, |row| row.of_truth(|t| t.preload_true_n)),
+        ]);
+        let levels = self.limit.into_iter().collect();
         Panel { least_span: 4.0, lines, levels, ..self.panel("Preload", "preload, N") }
     }
 
@@ -196,9 +200,8 @@ impl<'a> View<'a> {
         };
         let mut panel = self.panel("Clearance at the step root, and the gap", y_name);
         panel.also = reference_mm.map(|_| (one, "mm"));
-        panel.lines = vec![
-            self.line("clearance", Look::Truth, |row| row.of_truth(|t| t.root_clearance_mm) / one),
-        ];
+        panel.lines =
+            vec![self.line("clearance", Truth, |row| row.of_truth(|t| t.root_clearance_mm) / one)];
         panel.marks = vec![
             self.marks("measured", (Shape::Ring, palette::GAP), |c| Some(c.gap_measured_mm? / one)),
             self.marks("predicted", (Shape::Square, palette::FLOOR), |c| {
@@ -208,8 +211,7 @@ impl<'a> View<'a> {
         ];
         let most = 100.0 * (1.0 + GAP_TOLERANCE);
         if reference_mm.is_some() {
-            panel.levels =
-                vec![("reference gap", Look::Wanted, 100.0), ("tolerance", Look::Limit, most)];
+            panel.levels = vec![("reference gap", Wanted, 100.0), ("tolerance", Limit, most)];
         }
         // The clearance before touch and after the climb is unrelated to the gap.
         let gaps = panel.marks.iter().flat_map(|marks| &marks.points).map(|point| point.1);
@@ -223,46 +225,40 @@ impl<'a> View<'a> {
     }
 
     pub(super) fn radius(&self) -> Panel {
-        let lines = vec![
-            self.line("from the arm angle", Look::Measured(palette::RADIUS), |row| {
-                row.controller.radius_mm
-            }),
-            self.line("true", Look::Truth, |row| row.of_truth(|t| t.radius_true_mm)),
-        ];
+        let lines = self.lines([
+            ("from the arm angle", Measured(palette::RADIUS), |row| row.controller.radius_mm),
+            ("true", Truth, |row| row.of_truth(|t| t.radius_true_mm)),
+        ]);
         Panel { lines, ..self.panel("Radial position of the wheel centre", "radius, mm") }
     }
 
     pub(super) fn slip_margin(&self) -> Panel {
         let mut panel = self.panel("Slip margin", "friction left, µ - used");
         panel.least_span = 0.2;
-        panel.lines = vec![
-            self.line("planned", Look::Measured(palette::SLIP), |row| row.controller.slip_margin),
-            self.line("true", Look::Truth, |row| row.of_truth(|t| t.slip_margin_true)),
-        ];
-        panel.levels = vec![("slip", Look::Limit, 0.0)];
+        panel.lines = self.lines([
+            ("planned", Measured(palette::SLIP), |row| row.controller.slip_margin),
+            ("true", Truth, |row| row.of_truth(|t| t.slip_margin_true)),
+        ]);
+        panel.levels = vec![("slip", Limit, 0.0)];
         let (low, high) = panel.y_range();
         panel.y = Some((low.min(-0.1), high));
         panel
     }
 
     pub(super) fn compression(&self) -> Panel {
-        let lines = vec![
-            self.line("measured", Look::Measured(palette::COMPRESSION), |row| {
-                row.controller.compression_mm
-            }),
-            self.line("true", Look::Truth, |row| row.of_truth(|t| t.compression_true_mm)),
-        ];
+        let lines = self.lines([
+            ("measured", Measured(palette::COMPRESSION), |row| row.controller.compression_mm),
+            ("true", Truth, |row| row.of_truth(|t| t.compression_true_mm)),
+        ]);
         Panel { least_span: 0.1, lines, ..self.panel("Tread compression", "compression, mm") }
     }
 
     /// What the motors are told.
     fn duty(&self) -> Panel {
-        let lines = vec![
-            self.line("drive", Look::Measured(palette::SPEED), |row| row.controller.drive_duty),
-            self.line("pre-tightener", Look::Measured(palette::PRELOAD), |row| {
-                row.controller.pretightener_duty
-            }),
-        ];
+        let lines = self.lines([
+            ("drive", Measured(palette::SPEED), |row| row.controller.drive_duty),
+            ("pre-tightener", Measured(palette::PRELOAD), |row| row.controller.pretightener_duty),
+        ]);
         Panel { least_span: 0.1, lines, ..self.panel("Duty of the motors", "duty, of full") }
     }
 }
@@ -310,8 +306,12 @@ pub fn overview_svg(recording: &Recording) -> String {
 
 /// A plot, with what the script needs to place its cursor: axis, and time at its zero.
 pub(super) fn figure(panel: &Panel, across: Across, size: (u32, u32), name: &str) -> String {
-    let axis = format!("data-across=\"{}\" data-since=\"{}\"", across.axis(), across.since_s());
-    panel.figure(&axis, size, name)
+    let (axis, zero_s) = match across {
+        Across::Position => ("position", 0.0),
+        Across::Time => ("time", 0.0),
+        Across::Since(start_s) => ("time", start_s),
+    };
+    panel.figure(&format!("data-across=\"{axis}\" data-since=\"{zero_s}\""), size, name)
 }
 
 #[cfg(test)]

@@ -166,6 +166,12 @@ impl Scene {
         Some(Self { measured, retracts, gap_ref_mm, geometry, crossings, columns, rows })
     }
 
+    /// The row at this time, or the first behind it, of the last one at most.
+    pub(super) fn row(&self, t_s: f64) -> &[f64; COLUMNS.len()] {
+        let place = self.rows.partition_point(|row| row[0] < t_s);
+        &self.rows[place.min(self.rows.len() - 1)]
+    }
+
     /// As JSON that can be a script's content.
     pub(super) fn json(&self) -> String {
         serde_json::to_string(self).expect("numbers and words").replace('<', "\\u003c")
@@ -175,17 +181,15 @@ impl Scene {
 fn event(geometry: &Geometry, rows: &[&Tick], line: &CrossingLine) -> Event {
     let at = rows.partition_point(|row| row.controller.t_s < line.touch_s).min(rows.len() - 1);
     let gap_mm = if line.gap_mm.is_finite() { Some(line.gap_mm) } else { line.gap_measured_mm };
-    let gap_mm = gap_mm.unwrap_or(f64::NAN);
-    let step_mm = geometry.step_mm(line.step_mm);
     Event {
         index: line.index,
         touch_s: line.touch_s,
         lift_s: line.lift_s,
         face_mm: line.step_mm,
-        step_mm,
+        step_mm: geometry.step_mm(line.step_mm),
         touch_mm: line.step_mm - rows[at].position_mm(),
         preload_n: line.preload_n,
-        gap_mm,
+        gap_mm: gap_mm.unwrap_or(f64::NAN),
     }
 }
 
@@ -300,11 +304,7 @@ mod tests {
         let least = clearances.fold(f64::INFINITY, f64::min);
         assert!((2.0..3.0).contains(&least), "{least}");
         assert!(!scene.json().contains("NaN"));
-    }
-
-    #[test]
-    fn a_run_with_unknown_parameters_has_no_scene() {
-        let mut recording = example::deploy();
+        // With unknown parameters there is none.
         recording.parameters = "not parameters".to_owned();
         assert!(Scene::new(&recording).is_none());
     }

@@ -138,7 +138,10 @@ impl Column {
 
     /// Compared with the true gap.
     const fn of_gap(self) -> Self {
-        Self { truth: Some((|c| c.gap_mm, gap_error)), ..self }
+        let error = |error, truth| {
+            format!("{} µm, {} %", signed(1e3 * error, 0), signed(100.0 * error / truth, 1))
+        };
+        Self { truth: Some((|c| c.gap_mm, error)), ..self }
     }
 
     const fn off_terminal(self) -> Self {
@@ -160,7 +163,7 @@ pub(crate) const COLUMNS: [Column; 13] = [
     Column::new("slip", "mm", 2, |c| Some(c.slip_mm)).off_terminal(),
     Column::new("step at", "mm", 2, |c| Some(c.step_mm)),
     Column {
-        truth: Some((|c| c.step_mm, step_error)),
+        truth: Some((|c| c.step_mm, |error, _| format!("{} µm", signed(1e3 * error, 0)))),
         ..Column::new("found at", "mm", 2, |c| c.step_found_mm).off_terminal()
     },
     Column::new("touch to lift", "s", 3, |c| Some((c.lift_s - c.touch_s).abs())).off_terminal(),
@@ -177,14 +180,6 @@ pub(crate) fn slowed_by(line: &CrossingLine) -> &'static str {
         Some(LimitedBy::LeastSpeed) => "least speed",
         Some(LimitedBy::Drive) => "drive speed",
     }
-}
-
-fn gap_error(error: f64, truth: f64) -> String {
-    format!("{} µm, {} %", signed(1e3 * error, 0), signed(100.0 * error / truth, 1))
-}
-
-fn step_error(error: f64, _: f64) -> String {
-    format!("{} µm", signed(1e3 * error, 0))
 }
 
 #[cfg(test)]
@@ -221,17 +216,11 @@ mod tests {
     }
 
     #[test]
-    fn injected_faults_are_named_before_those_found() {
+    fn what_was_injected_comes_first_then_faults_and_limits_in_the_order_of_time() {
         let mut summary = example::faulted().summary;
         summary.injected = vec!["preload-sensor stuck from 2 s".to_owned()];
-        let text = reports(&summary);
-        assert!(text.starts_with("<p>Injected: preload-sensor stuck from 2 s.</p>"), "{text}");
-        assert!(text.contains("fault 121"));
-    }
-
-    #[test]
-    fn faults_and_limits_are_in_the_order_of_time() {
-        let html = reports(&example::faulted().summary);
+        let html = reports(&summary);
+        assert!(html.starts_with("<p>Injected: preload-sensor stuck from 2 s.</p>"), "{html}");
         assert!(html.find("limit 201").unwrap() < html.find("fault 121").unwrap());
         assert!(html.contains("limit &amp; speed"));
         assert!(reports(&Summary::default()).contains("No fault"));

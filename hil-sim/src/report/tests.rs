@@ -1,18 +1,25 @@
 pub(crate) mod example;
-mod plots;
 
+use super::panels::{Across, View};
 use super::*;
 use crate::record::{Recording, Report};
 
 #[test]
-fn the_page_needs_no_other_file_and_is_small() {
-    let page = html(&example::deploy(), &[]);
+fn the_page_needs_no_other_file_is_small_and_shows_every_plot_and_figure() {
+    let recording = example::deploy();
+    let page = html(&recording, &[]);
     for outside in ["http://", "https://", " src=", "<link", "url(", "@import", "fetch(", "import("]
     {
         let found = page.replace("http://www.w3.org/2000/svg", "");
         assert!(!found.contains(outside), "{outside}");
     }
     assert!(page.len() < 2_000_000, "{} bytes", page.len());
+    // Seven plots and the bands on two axes, six plots for each of three crossings.
+    assert_eq!(page.matches("<figure data-across").count(), 2 * 8 + 3 * 6);
+    for text in ["3 crossings", "worst gap", "tau_s = 0.1059", env!("CARGO_PKG_VERSION")] {
+        assert!(page.to_lowercase().contains(&text.to_lowercase()), "{text}");
+    }
+    assert!(page.contains(&recording.summary.trace_digest));
 }
 
 #[test]
@@ -24,25 +31,6 @@ fn the_page_of_a_long_log_is_small_too() {
     assert!(page.len() < 2_000_000, "{} bytes", page.len());
     let cause = "by the reset pin; before: deploying: crossing at 2.001 s, 10.56 mm, level 0";
     assert!(page.contains(cause) && !page.contains("Deploy, "), "a mode is in words");
-}
-
-#[test]
-fn the_page_shows_every_plot_and_figure() {
-    let recording = example::deploy();
-    let page = html(&recording, &[]);
-    // Seven plots and the bands on two axes, six plots for each of three crossings.
-    assert_eq!(page.matches("<figure data-across").count(), 2 * 8 + 3 * 6);
-    for text in ["3 crossings", "worst gap", "tau_s = 0.1059", env!("CARGO_PKG_VERSION")] {
-        assert!(page.to_lowercase().contains(&text.to_lowercase()), "{text}");
-    }
-    assert!(page.contains(&recording.summary.trace_digest));
-}
-
-#[test]
-fn a_fault_is_in_the_headline() {
-    let page = html(&example::faulted(), &[]);
-    assert!(page.contains("<header class=\"bad\">"));
-    assert!(page.contains("Did not complete: fault 121"));
 }
 
 #[test]
@@ -91,6 +79,8 @@ fn the_times_of_a_page_count_from_the_command() {
 fn faults_limits_and_steps_are_marked_and_other_parameters_listed() {
     let mut recording = example::faulted();
     let page = html(&recording, &[]);
+    assert!(page.contains("<header class=\"bad\">"));
+    assert!(page.contains("Did not complete: fault 121"));
     let is_marked = |page: &str, mark: &str| page.contains(&format!(">{mark}</text>"));
     assert!(is_marked(&page, "201") && !page.contains(">touch</text>"));
     // At the right edge a name is to the left of its line.
@@ -102,6 +92,20 @@ fn faults_limits_and_steps_are_marked_and_other_parameters_listed() {
     assert!(is_marked(&html(&together, &[]), "201, 205"));
     recording.summary.overrides.insert("tread.tau_s".to_owned(), 0.2.into());
     assert!(html(&recording, &[]).contains("tread.tau_s = 0.2"));
+}
+
+#[test]
+fn axes_have_units_time_begins_at_the_command_and_the_measured_is_over_the_truth() {
+    let recording = example::deploy().since_command();
+    let view = View::new(&recording, Across::Time);
+    assert!(recording.rows[0].controller.t_s < -0.1);
+    assert_eq!(view.x.0, 0.0);
+    for panel in view.all().iter().filter(|panel| panel.bands.is_empty()) {
+        assert!(panel.y_name.contains(", "), "{}: {}", panel.title, panel.y_name);
+    }
+    let svg = view.preload().figure("", (1100, 240), "");
+    let line = |name: &str| svg.find(&format!("line{name}\"")).expect(name);
+    assert!(line("\" data-name=\"measured") > line(" truth"), "the truth hides the measured");
 }
 
 /// What the script shows at the cursor it reads off these paths.

@@ -4,6 +4,8 @@
 //! the corner of its step. Impossible cases are drawn separately: they must be refused.
 
 use interstage::rig::Rig;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 
 use crate::plant::draw::ELEMENTS;
@@ -33,26 +35,6 @@ impl Range {
         }
     }
 }
-
-/// Contact stiffness, Pa/m.
-const STIFFNESS: Range = Range::Decades(1e6, 1e12);
-/// Stiffening, dimensionless.
-const STIFFENING: Range = Range::Decades(1.0, 100.0);
-/// Relaxation time, s.
-const TAU: Range = Range::Decades(1e-6, 1e3);
-/// Step of time, s.
-const STEP_OF_TIME: Range = Range::Decades(1e-6, 20e-3);
-/// Moved mass over the drive's reflected mass.
-const MASS_RATIO: Range = Range::Decades(1e-3, 1e3);
-/// Speed of the tread, mm/s. Squared, so that slow runs have their share.
-const SPEED: Range = Range::Even(0.0, 2000.0);
-/// Height of the step, mm.
-const STEP: Range = Range::Even(0.0, 20.0);
-const FRICTION: Range = Range::Even(0.0, 3.0);
-/// Preload, N.
-const PRELOAD: Range = Range::Decades(5.0, 150.0);
-/// Axial load, N.
-const LOAD: Range = Range::Even(0.0, 60.0);
 
 /// Parameters whose ends are all combined as corners.
 const ENDS: usize = 8;
@@ -161,8 +143,8 @@ const PARTS: (f64, f64, f64) = (0.4, 0.3, 0.2);
 pub(super) fn draw(count: usize, seed: u64) -> Vec<StressCase> {
     let every = if count < 1000 { 4 } else { 1 };
     let corners = (0..1 << ENDS).step_by(every).map(corner);
-    let sequence = Sequence::new(seed);
-    let inside = (0..).map(|n| of(&sequence.point(n)));
+    let point = sequence(seed);
+    let inside = (0..).map(|n| of(&point(n)));
     let all = corners.chain(inside).take(count).enumerate();
     all.map(|(index, case)| StressCase { index, ..case }).collect()
 }
@@ -215,26 +197,29 @@ fn corner(bits: usize) -> StressCase {
     of(&parts)
 }
 
+/// The case at these parts of the ranges.
 fn of(parts: &[f64; DIMENSIONS]) -> StressCase {
+    use Range::{Decades, Even};
     let [k, s, tau, dt, ratio, v, h, mu, preload, load, arm, course, phase] = *parts;
-    let mass_ratio = MASS_RATIO.at(ratio);
-    let (stiffness, step_mm) = (STIFFNESS.at(k), STEP.at(h));
+    let mass_ratio = Decades(1e-3, 1e3).at(ratio);
+    let (stiffness, step_mm) = (Decades(1e6, 1e12).at(k), Even(0.0, 20.0).at(h));
     let carried_n = carries(stiffness, step_mm);
     let mut case = StressCase {
         index: 0,
         k_inf_pa_per_m: stiffness,
         // A fifth of the treads is without damping.
-        stiffening: STIFFENING.at((1.25 * s - 0.25).max(0.0)),
-        tau_s: TAU.at(tau),
-        dt_s: STEP_OF_TIME.at(dt),
+        stiffening: Decades(1.0, 100.0).at((1.25 * s - 0.25).max(0.0)),
+        tau_s: Decades(1e-6, 1e3).at(tau),
+        dt_s: Decades(1e-6, 20e-3).at(dt),
         mass_ratio,
         // Both masses move away from 40 kg and 1 kg by half of the ratio's decades.
         mass_kg: 6.0 * mass_ratio.sqrt(),
-        speed_mm_s: SPEED.at(v * v * v),
+        // Cubed, so that slow runs have their share.
+        speed_mm_s: Even(0.0, 2000.0).at(v * v * v),
         step_mm,
-        mu: FRICTION.at(mu),
-        preload_n: PRELOAD.at(preload).min(PARTS.0 * carried_n),
-        load_n: LOAD.at(load * load).min(PARTS.2 * carried_n),
+        mu: Even(0.0, 3.0).at(mu),
+        preload_n: Decades(5.0, 150.0).at(preload).min(PARTS.0 * carried_n),
+        load_n: Even(0.0, 60.0).at(load * load).min(PARTS.2 * carried_n),
         coupling: [1.0, 1.0, 0.0, 0.0, 0.0, -1.0][((arm * 6.0) as usize).min(5)],
         course: Course::ALL[((course * 5.0) as usize).min(4)],
         spring_n_per_mm: SPRING.min(PARTS.1 * carried_n / step_mm.max(1.0)),
@@ -254,29 +239,16 @@ fn of(parts: &[f64; DIMENSIONS]) -> StressCase {
 /// offset drawn from the seed.
 ///
 /// Source: Roberts, The unreasonable effectiveness of quasirandom sequences, 2018.
-struct Sequence {
-    offset: [f64; DIMENSIONS],
-    step: [f64; DIMENSIONS],
-}
-
-impl Sequence {
-    fn new(seed: u64) -> Self {
-        use rand::{Rng, SeedableRng};
-        let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
-        // The real root of x^(d+1) = x + 1.
-        let mut root = 1.0f64;
-        for _ in 0..64 {
-            root = (1.0 + root).powf(1.0 / (DIMENSIONS as f64 + 1.0));
-        }
-        Self {
-            offset: std::array::from_fn(|_| random.random()),
-            step: std::array::from_fn(|d| root.powi(-(d as i32) - 1)),
-        }
+fn sequence(seed: u64) -> impl Fn(u64) -> [f64; DIMENSIONS] {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    // The real root of x^(d+1) = x + 1.
+    let mut root = 1.0f64;
+    for _ in 0..64 {
+        root = (1.0 + root).powf(1.0 / (DIMENSIONS as f64 + 1.0));
     }
-
-    fn point(&self, n: u64) -> [f64; DIMENSIONS] {
-        std::array::from_fn(|d| (self.offset[d] + n as f64 * self.step[d]).fract())
-    }
+    let offset: [f64; DIMENSIONS] = std::array::from_fn(|_| random.random());
+    let step: [f64; DIMENSIONS] = std::array::from_fn(|d| root.powi(-(d as i32) - 1));
+    move |n| std::array::from_fn(|d| (offset[d] + n as f64 * step[d]).fract())
 }
 
 #[cfg(test)]

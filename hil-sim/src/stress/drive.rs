@@ -105,11 +105,10 @@ pub(super) fn run(case: &StressCase, plant: &PlantParameters) -> Result<Drove, P
             first = held;
         }
         let gained = held - first;
-        out.created_mj = if gained.is_nan() { f64::NAN } else { out.created_mj.max(gained) };
+        out.created_mj = largest(out.created_mj, gained);
         out.depth_mm = out.depth_mm.max(now.depth_mm);
         let unbalanced = now.unbalanced_n.abs() / force_of(&now).max(LEAST_N);
-        out.unbalanced =
-            if unbalanced.is_nan() { f64::NAN } else { out.unbalanced.max(unbalanced) };
+        out.unbalanced = largest(out.unbalanced, unbalanced);
         let top = plant.drive.no_load_mm_s;
         out.overspeed = out.overspeed.max(now.tread_mm_s.abs() / top);
         before = now;
@@ -121,6 +120,11 @@ pub(super) fn run(case: &StressCase, plant: &PlantParameters) -> Result<Drove, P
     let stride = (fastest * case.dt_s).min(LONGEST_MM);
     out.allowed_mj = stored + force * grain + (force + plant.load_n) * stride + modes;
     Ok(out)
+}
+
+/// The larger one; a value that is no number shows.
+fn largest(most: f64, value: f64) -> f64 {
+    if value.is_nan() { value } else { most.max(value) }
 }
 
 fn force_of(truth: &Truth) -> f64 {
@@ -200,9 +204,7 @@ pub(super) fn roll(case: &StressCase) -> Result<Roll, BalanceError> {
             lift += dy.abs();
         }
         (y, forces) = (height, now);
-        // Written so that a value that is not finite shows.
-        out.created_mj =
-            if given.is_nan() { f64::NAN } else { out.created_mj.max(-given - stored) };
+        out.created_mj = largest(out.created_mj, -given - stored);
         out.depth_mm = if y.is_nan() { f64::NAN } else { out.depth_mm.max(contact.depth_mm) };
     }
     // A corner between two elements touches neither: heights are known to the distance of the

@@ -1,15 +1,20 @@
 //! The campaign of faults at a few instants each: nothing undetected, nothing unsafe, and urgent
 //! faults are found at once. `cargo rig faults` is the complete campaign.
 
-use hil_sim::faults::campaign::{Case, FaultCampaign, MatrixRow, Outcome};
+use hil_sim::faults::campaign::{Case, FaultCampaign, MatrixRow, Outcome, twin, watched};
 use hil_sim::scenario::Scenario;
 use hil_sim::scenario::injection::{Injection, Kind, Target};
 use hil_sim::session::{Options, run};
 
-fn campaign(instants: usize, wanted: impl Fn(&str) -> bool) -> Outcome {
+fn campaign_on(scenario: Scenario, instants: usize, wanted: impl Fn(&str) -> bool) -> Outcome {
     let cases = Case::all().into_iter().filter(|case| wanted(&case.name())).collect();
-    let campaign = FaultCampaign { scenario: Scenario::default(), instants, cases };
-    campaign.run(&|| {}).expect("a campaign")
+    let campaign = FaultCampaign { scenario, instants, cases };
+    let rigs = campaign.rigs(twin, &|| {}).expect("runs without a fault");
+    campaign.on("sil", &rigs, watched).complete(&|| {}).expect("a campaign")
+}
+
+fn campaign(instants: usize, wanted: impl Fn(&str) -> bool) -> Outcome {
+    campaign_on(Scenario::default(), instants, wanted)
 }
 
 fn line<'a>(outcome: &'a Outcome, fault: &str) -> &'a MatrixRow {
@@ -141,8 +146,6 @@ fn a_long_travel_at_a_low_speed_is_given_its_time() {
     let long = slow(1000).with(&steps).expect("in range");
     let summary = run(&long, Options::default()).expect("a run").summary;
     assert!(summary.completed && summary.duration_s > Some(190.0), "{summary:?}");
-    let cases = Case::all().into_iter().filter(|case| case.name() == "log gone").collect();
-    let campaign = FaultCampaign { scenario: slow(300), instants: 1, cases };
-    let outcome = campaign.run(&|| {}).expect("a campaign");
+    let outcome = campaign_on(slow(300), 1, |name| name == "log gone");
     assert_eq!((outcome.undetected, outcome.unheld), (0, 0), "{outcome:#?}");
 }

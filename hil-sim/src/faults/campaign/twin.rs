@@ -38,7 +38,10 @@ impl Twin {
     where
         R: RunningRig<Error: From<RigError>>,
     {
-        let (mut operator, mut twin) = (Operator::default(), Self::new(scenario)?);
+        let planner = Planner::try_build(&scenario.rig)?;
+        let gap_ref_mm = Direction::ALL.map(|direction| planner.gap_ref(direction).to_num());
+        let mut twin = Self { gap_ref_mm, ..Self::default() };
+        let mut operator = Operator::default();
         let (longest_s, mut over_s) = (longest_s(&scenario.rig), 0.0);
         while rig.time_s() < longest_s {
             let t_s = rig.time_s();
@@ -55,15 +58,6 @@ impl Twin {
             }
         }
         Ok(twin)
-    }
-
-    /// Before the first tick.
-    fn new(scenario: &Scenario) -> Result<Self, RigError> {
-        let planner = Planner::try_build(&scenario.rig)?;
-        Ok(Self {
-            gap_ref_mm: Direction::ALL.map(|direction| planner.gap_ref(direction).to_num()),
-            ..Self::default()
-        })
     }
 
     /// A tick, after which the drive is in this mode; `over`: it is behind the end of the run.
