@@ -64,3 +64,16 @@ fn back(session: &mut Session<'_, '_>) -> Result<(), BringupError> {
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_was_seen_is_what_is_said() {
+        for (seen, says) in [(Seen::Nothing, ("none", true)), (Seen::Yes, ("some", false))] {
+            let check = nothing_seen("held in reset", seen, ["none", "some"], "look");
+            assert_eq!((&*check.measured, check.ok), says);
+        }
+    }
+}

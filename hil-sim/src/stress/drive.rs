@@ -122,9 +122,9 @@ pub(super) fn run(case: &StressCase, plant: &PlantParameters) -> Result<Drove, P
     Ok(out)
 }
 
-/// The larger one; a value that is no number shows.
+/// The larger one; a value that is no number stays.
 fn largest(most: f64, value: f64) -> f64 {
-    if value.is_nan() { value } else { most.max(value) }
+    if value <= most || most.is_nan() { most } else { value }
 }
 
 fn force_of(truth: &Truth) -> f64 {
@@ -212,4 +212,13 @@ pub(super) fn roll(case: &StressCase) -> Result<Roll, BalanceError> {
     let grain = std::f64::consts::TAU * RADIUS_MM / ELEMENTS as f64 + stride;
     out.resolved_mj = case.preload_n * (grain + 0.01 * lift);
     Ok(out)
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn a_value_that_is_no_number_is_not_forgotten() {
+        let of = |values: [f64; 3]| values.into_iter().fold(0.0, super::largest);
+        assert!(of([1.0, f64::NAN, 2.0]).is_nan() && of([1.0, 3.0, 2.0]) == 3.0);
+    }
 }
