@@ -14,8 +14,7 @@ use sensor::FaultySensor;
 
 use crate::plant::rig::{Drives, Truth, VirtualRig};
 use crate::scenario::injection::{Injection, Kind, Onset, Target};
-use crate::scenario::{Direction, Scenario};
-use crate::session::TICK_S;
+use crate::scenario::{Direction, Scenario, TICK_S};
 
 /// Difference of duty from which on a fault acts.
 const ACTS: f64 = 0.02;

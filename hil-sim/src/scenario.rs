@@ -25,6 +25,9 @@ use crate::plant::spread::{Noise, Section, Spread};
 use keys::Kind;
 use merge::{COMMAND_LINE, Merged, Provenance};
 
+/// Control period, s.
+pub const TICK_S: f64 = 1e-3;
+
 pub use keys::{KeyInfo, PRESETS};
 pub(crate) use keys::{leaves, nearest_word};
 pub use run::{ControllerKind, Direction, MismatchDraw, RunOptions, StepAnomaly};

@@ -20,8 +20,6 @@ use crate::scenario::{ControllerKind, Scenario};
 pub use closed_loop::{Session, drives, initial_rig, read};
 pub use stream::Stream;
 
-/// Control period, s.
-pub(crate) const TICK_S: f64 = 1e-3;
 /// Least useful speed, mm/s.
 const SLOWEST_MM_S: f64 = 2.0;
 /// What every run is given at least, s.

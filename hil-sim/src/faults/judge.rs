@@ -13,8 +13,7 @@ use crate::plant::draw::STOP_ROOM_MM;
 use crate::plant::rig::Truth;
 use crate::plant::wall::touch_mm;
 use crate::scenario::injection::{Kind, Target, entry};
-use crate::scenario::{Scenario, StepAnomaly};
-use crate::session::TICK_S;
+use crate::scenario::{Scenario, StepAnomaly, TICK_S};
 
 /// Part of its reference beyond which motion is uncommanded, and a constant, mm/s: half as
 /// fast again as asked is a wrong speed, but the one commanded.

@@ -11,8 +11,8 @@ use interstage::units::Tick;
 use super::{HilError, HostLine};
 use crate::probe::Port;
 use crate::record::{JoinedLog, Recording, starter};
-use crate::scenario::{ControllerKind, Scenario};
-use crate::session::{TICK_S, drives, initial_rig, longest_s, read};
+use crate::scenario::{ControllerKind, Scenario, TICK_S};
+use crate::session::{drives, initial_rig, longest_s, read};
 
 /// RTT channel of the binary log.
 const LOG: u32 = 1;

@@ -13,7 +13,8 @@ use super::IdentifyError;
 use super::forward::{Run, Trajectory};
 use super::least_squares::Noise;
 use super::least_squares::{Model, covariance, minimise};
-use super::record::{Record, Sample, TICK_S};
+use super::record::{Record, Sample};
+use crate::scenario::TICK_S;
 
 /// Dead time, ms.
 pub(crate) const DELAY: usize = 0;

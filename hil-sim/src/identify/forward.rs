@@ -14,10 +14,11 @@ use super::coordinates::{
     ARM_ZERO, CREEP, Coordinates, DRIVE, FRICTION, GEARBOX, LOAD, LOAD_GAIN, NO_LOAD, RADIUS,
     STIFFENING, STIFFNESS, TAU, TREAD_GAIN,
 };
-use super::record::{Record, TICK_S};
+use super::record::Record;
 use super::traces::{Bin, Effort, Traces, at};
 use crate::plant::draw::PlantParameters;
 use crate::plant::rig::{PlantError, VirtualRig};
+use crate::scenario::TICK_S;
 
 /// Step of the forward model, ticks.
 const STEP: usize = 2;

@@ -15,9 +15,6 @@ use crate::plant::rig::Drives;
 use crate::record::{Controller, Run};
 use crate::scenario::{Direction, Scenario};
 
-/// Length of a tick, s.
-pub const TICK_S: f64 = 1e-3;
-
 /// Longest gap in a log that is bridged by the last reading, ticks.
 const LONGEST_GAP: u32 = 20;
 

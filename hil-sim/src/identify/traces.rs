@@ -10,8 +10,9 @@ use std::f64::consts::TAU;
 use std::ops::Range;
 
 use super::IdentifyError;
-use super::record::{Record, Sample, TICK_S};
+use super::record::{Record, Sample};
 use crate::plant::wall::touch_mm;
+use crate::scenario::TICK_S;
 
 /// Length of a bin, ticks.
 pub(crate) const BIN: usize = 10;

@@ -6,7 +6,8 @@ use interstage::rig::Rig;
 
 use crate::plant::actuators::Pretightener;
 use crate::plant::rig::{Drives, PlantError, VirtualRig};
-use crate::session::{TICK_S, longest_s};
+use crate::scenario::TICK_S;
+use crate::session::longest_s;
 
 /// Time within which the screw is to make up for what it lacks, s.
 const CATCHES_UP_S: f64 = 0.02;

@@ -1,13 +1,13 @@
-//! The metadata beside a table: `log.csv-metadata.json`, in the form of the W3C's "CSV on the
+//! Rows of a table, and the metadata beside it: `log.csv-metadata.json`, in the form of the W3C's "CSV on the
 //! Web". It describes the columns, and has what a table has no place for: the firmware, the
 //! rig's parameters and the number of ticks.
 
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use super::write::write_row;
 use super::{Header, MODE_NAMES, STAGE_NAMES, Tick};
 use crate::files::{FileError, write_text};
 
@@ -23,6 +23,15 @@ pub struct Metadata {
     /// The ledger of the crossings, once the log is complete; null in a log of several starts.
     #[serde(default)]
     pub crossings: Value,
+}
+
+/// Adds a row. Reading gives the same bits; what is unknown is `NaN`. Without truth its
+/// columns are absent.
+pub(super) fn write_row<W: Write>(csv: &mut csv::Writer<W>, tick: &Tick) -> csv::Result<()> {
+    match tick.truth {
+        Some(truth) => csv.serialize((tick.controller, truth)),
+        None => csv.serialize(tick.controller),
+    }
 }
 
 /// Path of the metadata of the table at `csv`.

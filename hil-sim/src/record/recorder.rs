@@ -18,8 +18,8 @@ use crate::plant::draw::PlantParameters;
 use crate::plant::ledger::Crossing;
 use crate::plant::rig::{Truth, VirtualRig};
 use crate::plant::spread::Section;
-use crate::scenario::{MismatchDraw, Scenario};
-use crate::session::{TICK_S, longest_s};
+use crate::scenario::{MismatchDraw, Scenario, TICK_S};
+use crate::session::longest_s;
 use crate::table::counted;
 
 /// Largest distance from the end of travel after arrival, mm: twice the effect of creep and

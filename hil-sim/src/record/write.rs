@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use interstage::log::frame::LONGEST;
 
-use super::csv_file::{Metadata, write_metadata};
+use super::csv_file::{Metadata, write_metadata, write_row};
 use super::mcap_file::{McapFile, TICK_NS, wrapped};
 use super::tick::OFF;
 use super::{
@@ -31,15 +31,6 @@ pub struct WriteError {
     pub kept: u64,
     /// The system's error.
     source: Failure,
-}
-
-/// Adds a row. Reading gives the same bits; what is unknown is `NaN`. Without truth its
-/// columns are absent.
-pub(super) fn write_row<W: Write>(csv: &mut csv::Writer<W>, tick: &Tick) -> csv::Result<()> {
-    match tick.truth {
-        Some(truth) => csv.serialize((tick.controller, truth)),
-        None => csv.serialize(tick.controller),
-    }
 }
 
 /// Writes the rows of `recording` to `path`, below the names of the columns.

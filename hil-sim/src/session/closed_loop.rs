@@ -10,13 +10,13 @@ use interstage::tick::{Controller, Input, Output, State};
 use interstage::units::{Millimetres, MotorCommand, Tick};
 
 use super::stream::Stream;
-use super::{Options, RunError, RunningRig, TICK_S};
+use super::{Options, RunError, RunningRig};
 use crate::injector::{FaultInjector, FaultTimes, RecordFound};
 use crate::plant::limits::Refusal;
 use crate::plant::rig::{Drives, VirtualRig};
 use crate::plant::sensors::{Codes, Sensed, Sensors};
 use crate::record::{Controller as Columns, Recording, RunRecorder};
-use crate::scenario::{Direction, Scenario};
+use crate::scenario::{Direction, Scenario, TICK_S};
 
 /// The angle sensor is read every second tick.
 const ANGLE_EVERY: Tick = 2;

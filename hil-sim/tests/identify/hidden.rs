@@ -5,12 +5,13 @@
 //! nominal rig, makes three deployments; their sensor readings alone are handed on.
 
 use hil_sim::identify::accept::accept;
-use hil_sim::identify::record::{Reader, Record, TICK_S};
+use hil_sim::identify::record::{Reader, Record};
 use hil_sim::identify::result::identify;
 use hil_sim::plant::draw::PlantParameters;
 use hil_sim::plant::rig::VirtualRig;
 use hil_sim::plant::sensors::Sensors;
 use hil_sim::record::Summary;
+use hil_sim::scenario::TICK_S;
 use hil_sim::scenario::{ControllerKind, Scenario};
 use hil_sim::session::{Options, RunningRig, Session, drives};
 use interstage::supervise::{Command, Mode};
