@@ -316,5 +316,12 @@ mod tests {
         let state = EstimateState { known, ..state(back, 0.0, 0) };
         let confirmed = estimator().confirms_end(&state, &sensed(0, 0.0, 0.3));
         assert_eq!(confirmed, Err(Fault::PlaceUnconfirmed));
+        // Nor where its place is less sure than half a millimetre.
+        for (sigma, sure) in [(480_000, true), (520_000, false)] {
+            let mut state = EstimateState { direction: back, ..EstimateState::default() };
+            state.odometry.slip(Q16::ZERO, q16(sigma));
+            let confirmed = estimator().confirms_end(&state, &sensed(0, 0.0, 0.3));
+            assert_eq!(confirmed.is_ok(), sure, "{sigma}");
+        }
     }
 }

@@ -294,6 +294,7 @@ mod tests {
     fn both_files_give_back_what_came() {
         let stream = deployment().stream;
         let (counts, files) = written(&stream);
+        assert!(!String::from_utf8_lossy(&files[1]).contains("_true"), "no truth came");
         let (run, [mcap, csv]) = (Run::of_stream(&stream), files.map(|file| read(&file).unwrap()));
         assert_eq!(counts, run.counts);
         assert_eq!(csv.rows, run.rows);
