@@ -85,6 +85,11 @@ pub trait RunningRig {
     /// Mode of the controller.
     fn mode(&self) -> Mode;
 
+    /// Whether an operator may give a command.
+    fn is_free(&self) -> bool {
+        true
+    }
+
     /// Time since boot, s.
     fn time_s(&self) -> f64;
 
