@@ -6,13 +6,15 @@ use hil_sim::faults::campaign::{Case, FaultCampaign, Outcome, Twin};
 use hil_sim::firmware::{self, Profile};
 use hil_sim::record::Run;
 use hil_sim::scenario::Scenario;
+use hil_sim::scenario::injection::{Injection, Kind, Target};
 use interstage::restart::Restart;
 use interstage::tick::Event;
 use rig_board::bench::{Bench, Passed};
 use rig_board::campaign::{self, Firmware};
 use rig_board::chip::Pin;
 use rig_board::core::Register;
-use rig_board::faults::Fault;
+use rig_board::elf::FLASH;
+use rig_board::faults::switch;
 use rig_board::log::Strings;
 use rig_board::machine::Machine;
 use rig_board::peripherals::rcc::Cause;
@@ -53,6 +55,11 @@ pub(crate) fn tried(cases: Vec<Case>, instants: usize) -> Outcome {
     let failures: Vec<_> = outcome.matrix.iter().flat_map(|line| &line.failures).collect();
     assert_eq!((outcome.undetected, outcome.unheld), (0, 0), "{failures:#?}");
     outcome
+}
+
+/// A fault without magnitude.
+pub(crate) const fn fault(target: Target, kind: Kind) -> Injection {
+    Injection::at(target, kind, 0.0, 0.0)
 }
 
 /// A running board with its two logs.
@@ -145,8 +152,14 @@ impl Board {
         &mut self.bench.machine
     }
 
-    pub(crate) fn strike(&mut self, fault: Fault) {
-        fault.switch(self.machine(), true).expect("strikes");
+    pub(crate) fn strike(&mut self, fault: Injection) {
+        switch(self.machine(), &fault, true).expect("strikes");
+    }
+
+    /// Inverts this bit of a byte of the image.
+    pub(crate) fn flip(&mut self, address: u32, bit: u32) {
+        let bit = f64::from(8 * (address - FLASH.base) + bit);
+        self.strike(Injection::at(Target::Image, Kind::BitErrors, 0.0, bit));
     }
 
     /// Address of the first function whose name contains this.
