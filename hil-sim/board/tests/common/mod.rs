@@ -1,9 +1,11 @@
 //! The firmware for the emulated board, built once, and a running board.
 
 use std::sync::OnceLock;
+use std::time::Duration;
 
 use hil_sim::faults::campaign::{Case, FaultCampaign, Outcome, Twin};
 use hil_sim::firmware::{self, Profile};
+use hil_sim::probe::{Port, PortError};
 use hil_sim::record::Run;
 use hil_sim::scenario::Scenario;
 use hil_sim::scenario::injection::{Injection, Kind, Target};
@@ -60,6 +62,68 @@ pub(crate) fn tried(cases: Vec<Case>, instants: usize) -> Outcome {
 /// A fault without magnitude.
 pub(crate) const fn fault(target: Target, kind: Kind) -> Injection {
     Injection::at(target, kind, 0.0, 0.0)
+}
+
+/// A port at a probe on USB, where accesses take time and what is sent goes in pieces.
+pub(crate) struct OnUsb<P> {
+    pub(crate) port: P,
+    accesses: u32,
+    /// Time that they took and that has not passed at the port, ns; less than nothing if its last
+    /// pause was longer.
+    owed_ns: i64,
+}
+
+impl<P: Port> OnUsb<P> {
+    pub(crate) const fn new(port: P) -> Self {
+        Self { port, accesses: 0, owed_ns: 0 }
+    }
+
+    /// Lets the time of so many accesses pass: half a millisecond each, and an eighth of a second
+    /// now and then.
+    fn access(&mut self, accesses: u32) -> Result<(), PortError> {
+        for _ in 0..accesses {
+            self.accesses += 1;
+            self.owed_ns += if self.accesses.is_multiple_of(400) { 125_000_000 } else { 500_000 };
+        }
+        while self.owed_ns > 0 {
+            let before = self.port.now();
+            self.port.pass()?;
+            self.owed_ns -= (self.port.now() - before).as_nanos() as i64;
+        }
+        Ok(())
+    }
+}
+
+impl<P: Port> Port for OnUsb<P> {
+    fn up(&mut self, channel: u32) -> Result<Vec<u8>, PortError> {
+        // The offsets; then data and read offset.
+        self.access(1)?;
+        let bytes = self.port.up(channel)?;
+        self.access(if bytes.is_empty() { 0 } else { 2 })?;
+        Ok(bytes)
+    }
+
+    fn down(&mut self, channel: u32, bytes: &[u8]) -> Result<usize, PortError> {
+        self.access(4)?;
+        self.port.down(channel, &bytes[..bytes.len().min(5)])
+    }
+
+    fn reset(&mut self) -> Result<(), PortError> {
+        self.port.reset()
+    }
+
+    fn memory(&mut self, address: u32, into: &mut [u8]) -> Result<(), PortError> {
+        self.access(1)?;
+        self.port.memory(address, into)
+    }
+
+    fn pass(&mut self) -> Result<(), PortError> {
+        self.port.pass()
+    }
+
+    fn now(&self) -> Duration {
+        self.port.now()
+    }
 }
 
 /// A running board with its two logs.
