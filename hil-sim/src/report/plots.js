@@ -127,7 +127,7 @@ const plots = (() => {
       const labels = svg.querySelector(".labels"), taken = [];
       // A text at the first of these places where there is room; a fault's without room at the last.
       const add = (text, places, more, low, high, isFault) => {
-        const label = element("text", { ...more, "font-size": 11 }, text);
+        const label = element("text", more, text);
         labels.append(label);
         for (const [x, anchor] of places) {
           label.setAttribute("x", x);
