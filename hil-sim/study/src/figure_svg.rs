@@ -17,7 +17,7 @@ pub fn svg(figure: &Figure) -> String {
 fn look(source: Source) -> (Look, Shape) {
     match source {
         Source::Theory => (Look::Truth, Shape::Dot),
-        Source::Simulation => (Look::Other(palette::SIMULATED, 2.0), Shape::Ring),
+        Source::Simulation => (Look::Other(palette::SIMULATED, 2.0), Shape::Dot),
         Source::Experiment => (Look::Other(palette::PRELOAD, 1.5), Shape::Dot),
         Source::FiniteElements | Source::Published => (Look::Measured(palette::GAP), Shape::Square),
         Source::Fitted => (Look::Measured(palette::GAP), Shape::Frame),

@@ -10,8 +10,9 @@ use crate::report::svg::{TEXT_PX, escape, width};
 pub(super) const LEFT: f64 = 66.0;
 /// Right of the plot: half a tick label.
 pub(super) const RIGHT: f64 = 12.0;
-/// Above the plot: the names of the rules.
-pub(super) const RULES: f64 = 16.0;
+/// Above the plot: the names of the rules, or half a tick label.
+const RULES: f64 = 16.0;
+const ABOVE: f64 = 6.0;
 /// Below the plot: labels of the ticks and the name of the axis.
 const BELOW: f64 = 38.0;
 
@@ -30,6 +31,11 @@ fn text((x, y): (f64, f64), anchor: &str, more: &str, text: &str) -> String {
 }
 
 impl Panel {
+    /// Height above the plot, user units.
+    pub(super) fn above(&self) -> f64 {
+        if self.shades.is_empty() && self.rules.is_empty() { ABOVE } else { RULES }
+    }
+
     /// Height below the plot, user units.
     pub(super) fn below(&self) -> f64 {
         if self.x_name.is_empty() { 6.0 } else { BELOW }
@@ -47,16 +53,16 @@ impl Panel {
     /// Axes, names and data in a picture of this size with so much `left` of the plot, user units.
     pub(super) fn plot(&self, (wide, high): (f64, f64), left: f64) -> String {
         let (x, y) = (self.x, self.y_range());
-        let (bottom, end) = (high - self.below(), wide - RIGHT);
-        let (across, down) = (end - left, bottom - RULES);
+        let (top, bottom, end) = (self.above(), high - self.below(), wide - RIGHT);
+        let (across, down) = (end - left, bottom - top);
         let x_at = |value: f64| left + (value - x.0) / (x.1 - x.0) * across;
         let y_at = |value: f64| bottom - (value - y.0) / (y.1 - y.0) * down;
         let grid =
             |d: String| format!("<path class=\"grid\" stroke=\"{}\" d=\"{d}\"/>\n", palette::GRID);
         let (mut axes, mut names) = (String::new(), String::new());
-        for (tick, label) in self.x_axis.ticks(x, (wide / 75.0).max(2.0) as usize) {
+        for (tick, label) in self.x_axis.ticks(x, (across / 45.0).clamp(2.0, 10.0) as usize) {
             let at = x_at(tick);
-            axes += &grid(format!("M{at:.1} {RULES}V{bottom:.1}"));
+            axes += &grid(format!("M{at:.1} {top}V{bottom:.1}"));
             if !self.x_name.is_empty() {
                 axes += &text((at, bottom + 16.0), "middle", "", &label);
             }
@@ -71,7 +77,7 @@ impl Panel {
                 axes += &(grid(format!("M{left} {at:.1}H{end}")) + &label);
             }
         }
-        let (middle, centre) = (left + 0.5 * across, RULES + 0.5 * down);
+        let (middle, centre) = (left + 0.5 * across, top + 0.5 * down);
         if !self.x_name.is_empty() {
             names += &text((middle, bottom + 33.0), "middle", " class=\"across\"", &self.x_name);
         }
@@ -88,10 +94,10 @@ impl Panel {
         }
         format!(
             "<g class=\"text\" font-family=\"sans-serif\" font-size=\"{TEXT_PX}\" fill=\"{}\">\n\
-<g class=\"axes\">\n{axes}</g>\n{names}<svg class=\"data\" x=\"{left}\" y=\"{RULES}\" width=\"{across}\" \
+<g class=\"axes\">\n{axes}</g>\n{names}<svg class=\"data\" x=\"{left}\" y=\"{top}\" width=\"{across}\" \
 height=\"{down}\" viewBox=\"{} {} {} {}\" preserveAspectRatio=\"none\">\n\
 <g transform=\"scale(1 -1)\" fill=\"none\">\n{}</g></svg>\n\
-<path class=\"axis\" fill=\"none\" stroke=\"{}\" d=\"M{left} {RULES}V{bottom:.1}H{end:.1}\"/>\n\
+<path class=\"axis\" fill=\"none\" stroke=\"{}\" d=\"M{left} {top}V{bottom:.1}H{end:.1}\"/>\n\
 <g class=\"labels\">\n{labels}</g></g>\n",
             palette::TEXT,
             x.0,

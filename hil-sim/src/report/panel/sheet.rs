@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 
 use super::Panel;
 use super::legend::{flow, merged};
-use super::plot::{LEFT, RIGHT, RULES};
+use super::plot::{LEFT, RIGHT};
 
 /// Width of a picture, user units, and how many CSS pixels each of them is.
 pub(in crate::report) const WIDE: f64 = 512.0;
@@ -39,7 +39,7 @@ pub fn sheet(mut panels: Vec<Panel>, columns: usize, is_shared: bool) -> String 
         let most = |values: &mut dyn Iterator<Item = f64>| values.fold(0.0, f64::max);
         let head = most(&mut heads.iter().map(|head| head.1));
         for (place, (panel, (title, _))) in row.iter().zip(heads).enumerate() {
-            let plot = panel.plot((wide, RULES + PLOT + panel.below()), left);
+            let plot = panel.plot((wide, panel.above() + PLOT + panel.below()), left);
             let across = place as f64 * wide;
             let _ = write!(
                 svg,
@@ -47,7 +47,7 @@ pub fn sheet(mut panels: Vec<Panel>, columns: usize, is_shared: bool) -> String 
 <g transform=\"translate(0 {head})\">\n{plot}</g></g>\n"
             );
         }
-        down += head + RULES + PLOT + most(&mut row.iter().map(Panel::below)) + 4.0;
+        down += head + PLOT + 4.0 + most(&mut row.iter().map(|one| one.above() + one.below()));
     }
     format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{}\" height=\"{}\" viewBox=\"0 0 {WIDE} {down}\">\n\
@@ -65,6 +65,6 @@ impl Panel {
         let (head, taken) = self.head(WIDE, &self.legend());
         let plot = self.plot((WIDE, high - taken), LEFT);
         let svg = format!("{head}<g transform=\"translate(0 {taken})\">\n{plot}</g>\n");
-        (svg, [LEFT, WIDE - RIGHT, taken + RULES, high - self.below()])
+        (svg, [LEFT, WIDE - RIGHT, taken + self.above(), high - self.below()])
     }
 }

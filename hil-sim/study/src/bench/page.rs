@@ -51,8 +51,8 @@ fn plant_panel(report: &Report) -> Chart {
         line.map(|point| (1e-6 * point.wall_ns, error(point))).collect()
     };
     let series = vec![
-        Series::method(3, "gap", of(|point| point.gap_error)),
-        Series::method(4, "force", of(|point| point.force_error)),
+        Series::method(4, "gap", of(|point| point.gap_error)),
+        Series::method(0, "force", of(|point| point.force_error)),
     ];
     let (title, x) = ("Plant: worst of twelve crossings", "time of a crossing, ms");
     Chart::new(title, x, "relative error", series).logarithmic()
