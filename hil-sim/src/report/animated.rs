@@ -11,12 +11,12 @@ use super::verdict::origin;
 use crate::record::Recording;
 
 /// Size of the picture, CSS pixels.
-const SIZE: (f64, f64) = (ZOOM * WIDE, 675.0);
+const SIZE: (f64, f64) = (ZOOM * WIDE, 705.0);
 /// Where the pictures of wheel and corner are, and where the plots begin, with their heights.
 const WHEEL: &str = "y=\"40\" width=\"390\" height=\"300\" viewBox=\"-50 -54 80.6 62\"";
 const CORNER: &str = "x=\"400\" y=\"40\" width=\"240\" height=\"300\" viewBox=\"-11 -15 16 20\"";
 const PLOTS: f64 = 345.0;
-const PLOT: [f64; 2] = [145.0, 185.0];
+const PLOT: [f64; 2] = [145.0, 215.0];
 /// Shown around the first touch and lift-off, s.
 const AROUND_S: (f64, f64) = (0.45, 0.75);
 /// How many times slower than the run, and how long it stops at lift-off, s.

@@ -260,8 +260,8 @@ mod tests {
         let svg =
             beside_svg(&names.map(str::to_owned).into_iter().zip([&a, &b, &b]).collect::<Vec<_>>());
         for name in names {
-            // A line in four plots; the marks, some with rims, in one; five legends.
-            assert!([10, 11].contains(&svg.matches(name).count()), "{name}");
+            // A line in four plots; the marks, some with rims, in one; one legend.
+            assert!([6, 7].contains(&svg.matches(name).count()), "{name}");
         }
         assert!(svg.contains("reference gap") && !svg.contains("NaN"));
         // Each gap is a part of its own run's reference.

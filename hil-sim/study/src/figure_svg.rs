@@ -76,6 +76,7 @@ fn panel(chart: &Chart) -> Panel {
         }
         lines.push(line);
     }
+    lines.retain(|line| !line.points.is_empty());
     let xs = lines.iter().flat_map(|line| &line.points);
     let xs = xs.chain(marks.iter().flat_map(|one| &one.points)).map(|point| point.0);
     let (low, high) = extent(xs).unwrap_or((0.0, 1.0));
@@ -98,5 +99,35 @@ fn panel(chart: &Chart) -> Panel {
         lines,
         marks,
         ..Panel::default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_simulation_is_dashed_over_a_quantity_and_marked_in_its_category() {
+        let series = |source| Series {
+            range: vec![(0.0, 1.0, 3.0)],
+            ..Series::new(source, vec![(0.0, 2.0), (1.0, 2.5)])
+        };
+        let all = || [Source::Theory, Source::Simulation].map(series).to_vec();
+        let drawn = |chart| svg(&Figure::new("x", "", String::new(), 1, vec![chart]));
+        let lines = drawn(Chart::new("t", "x", "y", all()));
+        assert!(lines.contains("stroke-dasharray=\"8 4\"") && !lines.contains("class=\"mark"));
+        let names = ("x", vec!["first".to_owned(), "second".to_owned()]);
+        let marks = drawn(Chart::of_categories("t", names, "y", all()));
+        assert!(marks.contains(">second</text>") && marks.contains("d=\"M-0.1 2h0M0.9 2.5h0\""));
+        // The legend has no line where there is none.
+        assert!(!marks.contains("stroke-dasharray"), "{marks}");
+        assert_eq!(
+            marks.matches(palette::RANGE).count(),
+            4 + 1,
+            "two ranges each, and their sample"
+        );
+        let points = vec![(0.1, 1e-3), (1.0, 0.0), (10.0, 0.1)];
+        let chart = Chart::new("t", "x", "y", vec![Series::method(0, "a", points)]).logarithmic();
+        assert!(drawn(chart).contains("d=\"M-1 -3 1 -1\""));
     }
 }

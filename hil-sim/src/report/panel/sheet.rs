@@ -36,8 +36,8 @@ pub fn sheet(mut panels: Vec<Panel>, columns: usize, is_shared: bool) -> String 
         let own =
             |panel: &Panel| panel.head(wide, &if is_shared { Vec::new() } else { panel.legend() });
         let heads: Vec<_> = row.iter().map(own).collect();
-        let most = |values: &mut dyn Iterator<Item = f64>| values.fold(0.0, f64::max);
-        let head = most(&mut heads.iter().map(|head| head.1));
+        let head = heads.iter().map(|head| head.1).fold(0.0, f64::max);
+        let around = row.iter().map(|one| one.above() + one.below()).fold(0.0, f64::max);
         for (place, (panel, (title, _))) in row.iter().zip(heads).enumerate() {
             let plot = panel.plot((wide, panel.above() + PLOT + panel.below()), left);
             let across = place as f64 * wide;
@@ -47,7 +47,7 @@ pub fn sheet(mut panels: Vec<Panel>, columns: usize, is_shared: bool) -> String 
 <g transform=\"translate(0 {head})\">\n{plot}</g></g>\n"
             );
         }
-        down += head + PLOT + 4.0 + most(&mut row.iter().map(|one| one.above() + one.below()));
+        down += head + PLOT + around + 4.0;
     }
     format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{}\" height=\"{}\" viewBox=\"0 0 {WIDE} {down}\">\n\
