@@ -10,8 +10,7 @@ use super::claims::{
 };
 use super::experiment::{Experiment, Run, marks as mark_runs};
 use super::finite_elements::{self, Crossing};
-use super::histories::{Histories, stage_ends_mm};
-use super::histories::{Points, Quantity};
+use super::histories::{Histories, Points, Quantity, stage_ends_mm};
 use super::published::{AMPLITUDE_MM, CASES, COLLISION_N, STRESS};
 use super::simulation;
 use super::theory::{self, Drive, Lift};
@@ -262,7 +261,7 @@ pub fn claims(data: &Data) -> Vec<Claim> {
 /// Largest difference of the simulated clearance from the theoretical one behind its
 /// least value, relative.
 fn resemblance(one: &Histories) -> f64 {
-    let [theory, simulation] = one.clearance();
+    let [theory, simulation, _] = SOURCES.map(|source| one.clearance(source));
     let least = theory.iter().enumerate().min_by(|a, b| a.1.1.total_cmp(&b.1.1));
     let from = least.map_or(0, |(index, _)| index);
     let apart = |&(t, y): &(f64, f64)| Some((at(&simulation, t)? / y - 1.0).abs());

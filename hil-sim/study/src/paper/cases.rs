@@ -63,6 +63,7 @@ pub fn claims(data: &Data) -> Vec<Claim> {
     let less = cases()
         .map(|case| data.get(Peak(Collision, 0), case).map(|force| force - case.preload_n));
     let impact = cases().map(|case| data.get(Peak(Impact, 0), case));
+    // Whether two cases are in the same order by both, in every source.
     let alike = |a: usize, b: usize| {
         (0..3).all(|of| (less[a][of] < less[b][of]) == (impact[a][of] < impact[b][of]))
     };

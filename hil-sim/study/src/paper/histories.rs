@@ -8,6 +8,9 @@ use super::published::LOG_S;
 use super::{simulation, theory};
 use crate::figure::{Chart, SOURCES, Series, Source};
 
+/// What has a curve of its own, beside the means.
+const MODELS: [Source; 2] = [Source::Theory, Source::Simulation];
+
 /// One of this many points of theory and simulation is shown.
 const SHOWN_OF: usize = 8;
 
@@ -122,26 +125,22 @@ impl Histories {
     pub fn panel(&self, quantity: Quantity) -> Chart {
         let title = format!("{} {}", ["(a)", "(b)", "(c)"][quantity as usize], self.case.name());
         let means = self.means.iter().map(|mean| quantity.of(mean).clone());
-        let theory = Series::new(Source::Theory, thin(quantity.of(&self.theory)));
-        let simulation = Series::new(Source::Simulation, thin(quantity.of(&self.simulation)));
-        let series = [theory, simulation].into_iter().chain(Series::means(means)).collect();
+        let of = |source| Series::new(source, thin(self.points(quantity, source)));
+        let series = MODELS.map(of).into_iter().chain(Series::means(means)).collect();
         Chart::new(title, "time, s", quantity.axis(), series)
     }
 
-    /// Clearance from the root of the first step until the centre passes it, theory and
-    /// simulation.
-    pub fn clearance(&self) -> [Points; 2] {
-        [&self.theory, &self.simulation].map(|history| history.clearance_until(f64::INFINITY))
+    /// Clearance from the root of the first step until the centre passes it.
+    pub fn clearance(&self, source: Source) -> Points {
+        self.history(source).clearance_until(f64::INFINITY)
     }
 
     /// The clearance at the first step as a plot.
     pub fn clearance_panel(&self) -> Chart {
         let title = format!("Clearance (Fig. 16): {}", self.case.name());
-        let [theory, simulation] =
-            self.clearance().map(|points| points.into_iter().step_by(SHOWN_OF).collect());
+        let shown = |source| self.clearance(source).into_iter().step_by(SHOWN_OF).collect();
         let means = self.means.iter().map(|m| m.clearance_until(self.first_passed_s - 0.2));
-        let series = [(Source::Theory, theory), (Source::Simulation, simulation)]
-            .map(|(source, points)| Series::new(source, points));
+        let series = MODELS.map(|source| Series::new(source, shown(source)));
         let series = series.into_iter().chain(Series::means(means)).collect();
         Chart::new(title, "time, s", "root clearance, mm", series)
     }

@@ -16,8 +16,7 @@ use crate::reference::beam::BeamError;
 use crate::reference::vibration::Arm;
 use hil_sim::plant::balance::{Axial, BalanceError};
 use hil_sim::plant::crossing::{CrossingCase, cross};
-use hil_sim::plant::spread::Noise;
-use hil_sim::plant::spread::Section;
+use hil_sim::plant::spread::{Noise, Section};
 use hil_sim::rollout::{CrossingSetup, Wheel};
 
 /// The safe point, the faster one without and the faster one with more preload.
@@ -113,9 +112,7 @@ impl Hold {
         for (x, read) in self.read.iter().enumerate() {
             marks(x as f64, read, &mut experiment);
         }
-        let numbered = |source: usize| {
-            (0_u8..).map(f64::from).zip(self.gaps.map(|gaps| gaps[source])).collect()
-        };
+        let numbered = |source: usize| [0, 1, 2].map(|x| (x as f64, self.gaps[x][source])).to_vec();
         let gap = vec![
             Series::new(Source::Theory, numbered(0)),
             Series::new(Source::Simulation, numbered(1)),

@@ -108,11 +108,10 @@ impl Curves {
     }
 
     fn bends(&self) -> String {
-        let bends = self.by_source().map(|values| bend(&values));
+        let bends = percents(self.by_source().map(|values| bend(&values)), 1, " and ");
         format!(
-            "Off the straight line between the ends by {} of the change (theory, simulation, \
-             virtual rig).",
-            percents(bends, 1, " and ")
+            "Off the straight line between the ends by {bends} of the change (theory, simulation, \
+             virtual rig)."
         )
     }
 

@@ -68,7 +68,11 @@ pub fn claims(data: &Data) -> Vec<Claim> {
     let [collided, hit, shaken] = Quantity::ALL
         .map(|quantity| SOURCES.map(|source| fast.peaks(quantity, source)[0].time_s));
     let seconds = |times: BySource| times.map(|t| format!("{t:.2}")).join(", ");
-    let humps = SOURCES.map(|source| humps(fast, Vibration, source));
+    let until = fast.first_passed_s + 0.25;
+    let humps = SOURCES.map(|source| {
+        let first = fast.points(Vibration, source).iter().take_while(|p| p.0 <= until);
+        count_humps(first.map(|p| p.1), 0.05)
+    });
     let pairs = |related: fn(&Case, &Case) -> bool, sense| {
         let pairs = cases().into_iter().flat_map(|a| cases().map(|b| [a, b]));
         let pairs: Vec<[Case; 2]> = pairs.filter(|[a, b]| related(a, b)).collect();
@@ -137,14 +141,6 @@ pub fn claims(data: &Data) -> Vec<Claim> {
     ])
 }
 
-/// Local maxima of the first transition that exceed both neighbouring minima by a
-/// twentieth of its peak.
-fn humps(one: &Histories, quantity: Quantity, source: Source) -> usize {
-    let until = one.first_passed_s + 0.25;
-    let points = one.points(quantity, source);
-    count_humps(points.iter().take_while(|p| p.0 <= until).map(|p| p.1), 0.05)
-}
-
 /// Local maxima that exceed the minima before and after them by this part of the largest
 /// value.
 pub(super) fn count_humps(values: impl Iterator<Item = f64> + Clone, part: f64) -> usize {
@@ -170,10 +166,9 @@ pub(super) fn count_humps(values: impl Iterator<Item = f64> + Clone, part: f64) 
 fn likeness(one: &Histories, quantity: Quantity) -> f64 {
     let theory = one.points(quantity, Source::Theory);
     let against = |source| {
-        let other = one.points(quantity, source);
-        let pairs: Vec<(f64, f64)> =
-            other.iter().filter_map(|&(t, y)| Some((y, at(theory, t)?))).collect();
-        correlation(&pairs)
+        let points = one.points(quantity, source).iter();
+        let pairs = points.filter_map(|&(t, y)| Some((y, at(theory, t)?)));
+        correlation(&pairs.collect::<Vec<_>>())
     };
     against(Source::Simulation).min(against(Source::Experiment))
 }
@@ -181,9 +176,8 @@ fn likeness(one: &Histories, quantity: Quantity) -> f64 {
 /// Least correlation with the collision within a source.
 fn following(one: &Histories, quantity: Quantity) -> f64 {
     let within = |source| {
-        let collision = one.points(Collision, source);
-        let other = one.points(quantity, source);
-        correlation(&collision.iter().zip(other).map(|(a, b)| (a.1, b.1)).collect::<Vec<_>>())
+        let pairs = one.points(Collision, source).iter().zip(one.points(quantity, source));
+        correlation(&pairs.map(|(a, b)| (a.1, b.1)).collect::<Vec<_>>())
     };
     SOURCES.map(within).into_iter().fold(1.0, f64::min)
 }
