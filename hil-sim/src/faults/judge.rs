@@ -359,7 +359,7 @@ mod tests {
         for (target, kind, names, other) in [
             (Target::Dma, Kind::Stalled, 103, 123),
             (Target::StopWire, Kind::Shorted, 128, 123),
-            (Target::Debugger, Kind::Halted, 216, 123),
+            (Target::Debugger, Kind::Halted, 216, 112),
             (Target::Image, Kind::BitErrors, 0, 123),
         ] {
             assert_eq!(of(target, kind, &[other]).0, Finding::Otherwise, "{target:?}");

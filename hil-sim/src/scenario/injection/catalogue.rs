@@ -46,7 +46,7 @@ const fn codes(target: Target) -> &'static [u16] {
         Dma => &[102, 103, 105],
         // The button's other contact takes the supply from the motors, not from their bridges.
         StopWire => &[128, 129, 151],
-        Debugger => &[216],
+        Debugger => &[101, 123, 216],
         _ => &[],
     }
 }
