@@ -15,7 +15,7 @@ use crate::scenario::{KeyInfo, PRESETS, Scenario};
 use crate::table::plain;
 
 /// Sections of a scenario that a board does not hold.
-const ELSEWHERE: [&str; 4] = ["preset", "spread.", "noise.", "run."];
+const ELSEWHERE: [&str; 5] = ["preset", "mismatch.", "spread.", "noise.", "run."];
 
 /// Reads and changes the parameters that a board, or a file, holds.
 ///
@@ -130,11 +130,7 @@ pub fn act(args: &Args, store: &mut impl Store) -> Result<Outcome, Failure> {
         Action::Set { sets, name } => {
             let new = scenario.clone().with(sets)?;
             let name = name.as_deref().unwrap_or(&held.name);
-            if new.run != scenario.run
-                || new.spread != scenario.spread
-                || new.noise != scenario.noise
-                || new.preset != scenario.preset
-            {
+            if new != (Scenario { rig: new.rig.clone(), ..scenario.clone() }) {
                 return Err(not_here(sets));
             }
             replace(args, store, &scenario, &new, name)

@@ -86,7 +86,7 @@ impl Bounds {
 #[derive(Clone, Debug, Default)]
 pub struct Judge {
     bounds: Bounds,
-    /// Codes that name what was injected; none if all do.
+    /// Codes that name what was injected; none if nothing was, and any report is of nothing.
     codes: Option<&'static [u16]>,
     ends_mm: (f64, f64),
     /// Largest distance from the end while it reported arrival, mm.
@@ -120,7 +120,7 @@ impl Judge {
         let commanded = target == Some(Target::Commands);
         let entry = fault.and_then(|fault| entry(fault.target, fault.kind));
         let anomaly = scenario.run.anomalies.first().map(StepAnomaly::codes);
-        let codes = entry.map_or(anomaly, |entry| entry.codes);
+        let codes = entry.map(|entry| entry.codes).or(anomaly);
         Self {
             bounds: Bounds::of(&scenario.rig, slips),
             codes,
@@ -336,9 +336,9 @@ mod tests {
 
     #[test]
     fn what_does_not_name_the_fault_is_found_as_something_else() {
-        let finding = |codes: &[u16]| {
+        let of = |target, kind, codes: &[u16]| {
             let mut scenario = Scenario::default();
-            scenario.run.faults = vec![Injection::at(Target::Encoder, Kind::Gain, 0.0, 1.5)];
+            scenario.run.faults = vec![Injection::at(target, kind, 0.0, 1.5)];
             let mut judge = Judge::new(&scenario, &Truth::default());
             judge.mode = Mode::Complete(Direction::Retract);
             judge.rest_s = Some(1.0);
@@ -350,10 +350,24 @@ mod tests {
             }
             (judge.finding(&[], 1.0, true), judge.report(&[]).map(|(_, code)| code))
         };
+        let finding = |codes: &[u16]| of(Target::Encoder, Kind::Gain, codes);
         assert_eq!(finding(&[125]), (Finding::Found, Some(125)));
         assert_eq!(finding(&[136]), (Finding::Otherwise, Some(136)));
         assert_eq!(finding(&[219]), (Finding::Otherwise, Some(219)));
         assert_eq!(finding(&[219, 125]), (Finding::Found, Some(125)));
+        // Those of the board's hardware are named by their own codes, too.
+        for (target, kind, names, other) in [
+            (Target::Dma, Kind::Stalled, 103, 123),
+            (Target::StopWire, Kind::Shorted, 128, 123),
+            (Target::Debugger, Kind::Halted, 216, 123),
+            (Target::Image, Kind::BitErrors, 0, 123),
+        ] {
+            assert_eq!(of(target, kind, &[other]).0, Finding::Otherwise, "{target:?}");
+            if names > 0 {
+                let found = of(target, kind, &[names]).0;
+                assert_eq!(found, if names < 200 { Finding::Found } else { Finding::Limited });
+            }
+        }
         // What the controller does about its task names nothing.
         assert_eq!(finding(&[205]), (Finding::Tolerated, None));
     }

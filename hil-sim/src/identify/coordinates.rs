@@ -1,8 +1,10 @@
-//! The coordinates of the fit: logarithms where only the ratio matters, the rest in units of
-//! about their tolerance; and the prior of each.
+//! The coordinates of the fit, one row each: logarithms where only the ratio matters, the rest in
+//! units of about their tolerance.
 
+use std::f64::consts::TAU as TURN;
 use std::ops::Range;
 
+use interstage::rig::Rig;
 use nalgebra::DMatrix;
 
 use crate::plant::draw::PlantParameters;
@@ -12,32 +14,20 @@ use crate::plant::spread::Spread;
 use crate::plant::wall::{Step, Wall};
 use crate::scenario::Scenario;
 
-/// Relaxed stiffness, logarithm.
+// Places in [`ROWS`].
 pub(crate) const STIFFNESS: usize = 0;
-/// Stiffening, logarithm.
 pub(crate) const STIFFENING: usize = 1;
-/// Relaxation time, logarithm.
 pub const TAU: usize = 2;
-/// Friction, logarithm.
 pub const FRICTION: usize = 3;
-/// Axial load on the wheel, logarithm.
 pub const LOAD: usize = 4;
-/// Friction of the gearbox, N at the tread.
 pub(crate) const GEARBOX: usize = 5;
-/// Wheel radius, mm.
 pub const RADIUS: usize = 6;
-/// Gain of the preload sensor over nominal, logarithm.
 pub(crate) const LOAD_GAIN: usize = 7;
-/// Gain of the compression sensor over nominal, logarithm.
 pub(crate) const TREAD_GAIN: usize = 8;
-/// Zero of the arm angle, mrad.
-pub(crate) const ARM_ZERO: usize = 9;
-/// Elastic creep, logarithm.
-pub(crate) const CREEP: usize = 10;
-/// Force of the drive over nominal, logarithm.
-pub const DRIVE: usize = 11;
-/// No-load speed of the drive over the stated one, logarithm.
-pub(crate) const NO_LOAD: usize = 12;
+pub(crate) const CREEP: usize = 9;
+pub const DRIVE: usize = 10;
+pub(crate) const NO_LOAD: usize = 11;
+pub(crate) const ARM_ZERO: usize = 12;
 /// First of the steps: all positions as the wheel's turn has them at its nominal radius,
 /// mm, so that a wheel of another radius meets them at the same turn; then all heights, mm.
 pub const STEPS: usize = 13;
@@ -69,6 +59,144 @@ pub struct Prior {
     pub tolerance: bool,
 }
 
+/// How what a log would show changes with a coordinate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Moves {
+    /// By simulations with so much more and less: so far that the ring's elements, which meet a
+    /// corner one by one, show little.
+    Rig(f64),
+    /// By what the sensors make of the same trajectory.
+    Sensors,
+    /// All forces alike.
+    Forces,
+}
+
+/// What the priors come from: the rig as stated, without tolerances, and these.
+type Stated<'a> = (&'a PlantParameters, &'a Spread);
+
+/// A coordinate of every rig.
+pub(crate) struct Row {
+    /// Key or name, unit and evidence of the parameter.
+    pub(crate) shown: (&'static str, &'static str, &'static str),
+    /// The parameter in its unit.
+    pub(crate) of: fn(f64, &Rig) -> f64,
+    prior: fn(Stated<'_>) -> Prior,
+    pub(crate) moves: Moves,
+}
+
+const PRESSED: &str = "compression under known preload, at rest";
+const ROLLING: &str = "compression at rest and rolling";
+const SPEEDS: &str = "compression and lift at several speeds";
+const CREEPS: &str = "creep at the climbs, by its law";
+
+/// Logarithms of tread, friction and load, lengths and forces in mm and N, gains as logarithms, the
+/// zero of the arm in mrad.
+pub(crate) const ROWS: [Row; STEPS] = [
+    Row {
+        shown: ("tread.k_inf_pa_per_m", "Pa/m", PRESSED),
+        of: |x, _| 1e9 * x.exp(),
+        prior: |(plant, _)| free(plant.ring.k_inf.ln(), UNKNOWN_LN),
+        moves: Moves::Rig(0.01),
+    },
+    Row {
+        shown: ("tread.stiffening", "", ROLLING),
+        of: ratio,
+        prior: |(plant, _)| free((plant.ring.k_0 / plant.ring.k_inf).ln(), UNKNOWN_LN),
+        moves: Moves::Rig(0.01),
+    },
+    Row {
+        shown: ("tread.tau_s", "s", SPEEDS),
+        of: ratio,
+        prior: |(plant, _)| free(plant.ring.tau_s.ln(), UNKNOWN_LN),
+        moves: Moves::Rig(0.02),
+    },
+    Row {
+        shown: ("plant.mu", "", CREEPS),
+        of: ratio,
+        prior: |(plant, _)| free(plant.mu.ln(), UNKNOWN_LN),
+        moves: Moves::Rig(0.1),
+    },
+    Row {
+        shown: ("plant.top_load_n", "N", "arm thrust and drive effort"),
+        of: |x, rig| x.exp() / rig.plant.top_load_share.max(1e-9),
+        prior: |(plant, _)| free(plant.load_n.ln(), UNKNOWN_LN),
+        moves: Moves::Rig(0.02),
+    },
+    Row {
+        shown: ("gearbox friction", "N", "drive effort on the smooth wall"),
+        of: itself,
+        prior: |(plant, _)| free(plant.drive.friction_n, UNKNOWN_GEARBOX_N),
+        moves: Moves::Sensors,
+    },
+    Row {
+        shown: ("rig.wheel_radius_mm", "mm", "shape of the climbs"),
+        of: itself,
+        // Wear is drawn evenly from none to the most, what is made evenly about nominal.
+        prior: |(plant, spread)| {
+            let (made, worn) = (spread.wheel_radius_mm, spread.wear_mm);
+            let deviation = (made * made / 3.0 + worn * worn / 12.0).sqrt();
+            known(plant.ring.radius_mm - 0.5 * worn, deviation)
+        },
+        moves: Moves::Rig(0.08),
+    },
+    Row {
+        shown: ("preload sensor gain", "", "loads against the drive"),
+        of: ratio,
+        prior: |(_, spread)| known(0.0, spread.preload_sensor_gain_rel),
+        moves: Moves::Forces,
+    },
+    Row {
+        shown: ("compression sensor gain", "", "compression against the arm"),
+        of: ratio,
+        prior: |(_, spread)| known(0.0, spread.compression_sensor_gain_rel),
+        moves: Moves::Sensors,
+    },
+    Row {
+        shown: ("plant.elastic_creep", "", "creep at the climbs"),
+        of: ratio,
+        prior: |(plant, _)| known(plant.elastic_creep.ln(), CREEP_REL),
+        moves: Moves::Rig(0.05),
+    },
+    Row {
+        shown: ("drive force over nominal", "", "effort against load"),
+        of: ratio,
+        prior: |_| known(0.0, DRIVE_REL),
+        moves: Moves::Sensors,
+    },
+    Row {
+        shown: ("drive.no_load_speed_mm_s", "mm/s", "effort against speed"),
+        of: |x, rig| rig.drive.no_load_speed_mm_s * x.exp(),
+        prior: |_| known(0.0, NO_LOAD_REL),
+        moves: Moves::Sensors,
+    },
+    Row {
+        shown: ("sense.angle_zero_code", "codes", "arm angle at known radii"),
+        of: |mrad, rig| rig.sense.angle_zero_code + 16_384.0 * 1e-3 * mrad / TURN,
+        prior: |_| free(0.0, UNKNOWN_ARM_MRAD),
+        moves: Moves::Sensors,
+    },
+];
+
+/// A ratio, of its logarithm.
+fn ratio(x: f64, _: &Rig) -> f64 {
+    x.exp()
+}
+
+/// A parameter that is its own coordinate.
+pub(crate) fn itself(x: f64, _: &Rig) -> f64 {
+    x
+}
+
+/// What only the logs can show.
+const fn free(mean: f64, deviation: f64) -> Prior {
+    Prior { mean, deviation, tolerance: false }
+}
+
+/// What a tolerance of the rig states.
+const fn known(mean: f64, deviation: f64) -> Prior {
+    Prior { mean, deviation: deviation.max(EXACT), tolerance: true }
+}
+
 /// Meaning of the coordinates for one rig.
 #[derive(Clone, Debug)]
 pub struct Coordinates {
@@ -89,30 +217,8 @@ impl Coordinates {
         let nominal = exact.plant();
         let steps = nominal.wall.steps().len();
         let spread = &scenario.spread;
-        let free = |mean: f64, deviation| Prior { mean, deviation, tolerance: false };
-        let known =
-            |mean, deviation: f64| Prior { mean, deviation: deviation.max(EXACT), tolerance: true };
-        // Wear is drawn evenly from none to the most, what is made evenly about nominal.
-        let (made, worn) = (spread.wheel_radius_mm, spread.wear_mm);
-        let radius = known(
-            nominal.ring.radius_mm - 0.5 * worn,
-            (made * made / 3.0 + worn * worn / 12.0).sqrt(),
-        );
-        let mut priors = vec![
-            free(nominal.ring.k_inf.ln(), UNKNOWN_LN),
-            free((nominal.ring.k_0 / nominal.ring.k_inf).ln(), UNKNOWN_LN),
-            free(nominal.ring.tau_s.ln(), UNKNOWN_LN),
-            free(nominal.mu.ln(), UNKNOWN_LN),
-            free(nominal.load_n.ln(), UNKNOWN_LN),
-            free(nominal.drive.friction_n, UNKNOWN_GEARBOX_N),
-            radius,
-            known(0.0, spread.preload_sensor_gain_rel),
-            known(0.0, spread.compression_sensor_gain_rel),
-            free(0.0, UNKNOWN_ARM_MRAD),
-            known(nominal.elastic_creep.ln(), CREEP_REL),
-            known(0.0, DRIVE_REL),
-            known(0.0, NO_LOAD_REL),
-        ];
+        let mut priors: Vec<Prior> =
+            ROWS.iter().map(|row| (row.prior)((&nominal, spread))).collect();
         let all = nominal.wall.steps().iter();
         priors.extend(all.clone().map(|step| free(step.position_mm, UNKNOWN_POSITION_MM)));
         priors.extend(all.map(|step| free(step.height_mm, UNKNOWN_HEIGHT_MM)));

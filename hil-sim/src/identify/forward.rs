@@ -11,8 +11,8 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use super::coordinates::{
-    ARM_ZERO, CREEP, Coordinates, DRIVE, FRICTION, GEARBOX, LOAD, LOAD_GAIN, NO_LOAD, RADIUS,
-    STIFFENING, STIFFNESS, TAU, TREAD_GAIN,
+    ARM_ZERO, Coordinates, DRIVE, FRICTION, GEARBOX, LOAD_GAIN, Moves, NO_LOAD, RADIUS, ROWS,
+    TREAD_GAIN,
 };
 use super::record::Record;
 use super::traces::{Bin, Effort, Traces, at};
@@ -207,17 +207,6 @@ impl Trajectory {
     }
 }
 
-/// Coordinates by which simulations are differenced, and by how much to either side: so
-/// far that the ring's elements, which meet a corner one by one, show little.
-const MOVED: [(usize, f64); 7] = [
-    (STIFFNESS, 0.01),
-    (STIFFENING, 0.01),
-    (TAU, 0.02),
-    (FRICTION, 0.1),
-    (LOAD, 0.02),
-    (RADIUS, 0.08),
-    (CREEP, 0.05),
-];
 /// By how much friction is moved at least, logarithm.
 const LEAST_MOVED: f64 = 0.01;
 
@@ -243,11 +232,12 @@ pub(crate) fn derivatives(
     let places = coordinates.of_steps().chain(run.start).map(|index| (index, by_mm));
     // Friction by half of what keeps the wheel from slipping at most.
     let room = 0.5 * (x[FRICTION].exp() / base.most_utilisation).ln();
-    let moved = MOVED.map(|(index, by)| {
-        let most = if index == FRICTION { room.max(LEAST_MOVED) } else { by };
-        (index, by.min(most))
+    let moved = ROWS.iter().enumerate().filter_map(|(index, row)| match row.moves {
+        Moves::Rig(by) if index == FRICTION => Some((index, by.min(room.max(LEAST_MOVED)))),
+        Moves::Rig(by) => Some((index, by)),
+        Moves::Sensors | Moves::Forces => None,
     });
-    let moves: Vec<(usize, f64)> = moved.into_iter().chain(places).collect();
+    let moves: Vec<(usize, f64)> = moved.chain(places).collect();
     let difference = |&(index, by): &(usize, f64)| {
         let moved = |by: f64| {
             let mut x = x.to_vec();
@@ -278,7 +268,7 @@ pub(crate) fn derivatives(
     }
     // The drive's effort depends on the radius, too.
     columns[RADIUS] = combined(&columns[RADIUS], &by_sensors(RADIUS, 1e-3), |a, b| a + b);
-    for index in [GEARBOX, TREAD_GAIN, ARM_ZERO, DRIVE, NO_LOAD] {
+    for (index, _) in (0..).zip(&ROWS).filter(|(_, row)| row.moves == Moves::Sensors) {
         columns[index] = by_sensors(index, 1e-4);
     }
     // All forces scaled alike change no geometry: a preload sensor that reads high is a

@@ -2,18 +2,15 @@
 //! residuals, and the scenario with the new values.
 
 use std::collections::BTreeMap;
-use std::f64::consts::TAU as TURN;
 
+use interstage::rig::Rig;
 use serde::Serialize;
 use toml::{Table, Value};
 
 use super::IdentifyError;
 use super::actuator::{self, Actuator};
 use super::contact::{self, Contact};
-use super::coordinates::{
-    ARM_ZERO, CREEP, Coordinates, DRIVE, FRICTION, GEARBOX, LOAD, LOAD_GAIN, NO_LOAD, RADIUS,
-    STIFFENING, STIFFNESS, TAU, TREAD_GAIN,
-};
+use super::coordinates::{Coordinates, LOAD_GAIN, NO_LOAD, RADIUS, ROWS, itself};
 use super::forward::{CHANNELS, Run};
 use super::least_squares::Noise;
 use super::record::Record;
@@ -191,12 +188,15 @@ struct Document<'a> {
     lost: f64,
 }
 
-/// A coordinate as a parameter: its index, name, unit and evidence.
-type Shown<'a> = (usize, &'a str, &'static str, &'a str);
-
 impl Document<'_> {
-    /// The parameter of a coordinate: `of` takes it to the parameter's own unit.
-    fn parameter(&self, (index, name, unit, by): Shown<'_>, of: &dyn Fn(f64) -> f64) -> Parameter {
+    /// The parameter of a coordinate by its name, unit and evidence: `of` takes it to its own unit.
+    fn parameter(
+        &self,
+        index: usize,
+        (name, unit, by): (&str, &'static str, &str),
+        of: fn(f64, &Rig) -> f64,
+    ) -> Parameter {
+        let of = |x: f64| of(x, &self.scenario.rig);
         let (x, prior) = (self.contact.x[index], self.coordinates.priors()[index]);
         // A bridge cuts some pulses short, at full duty none: the drive's as the pre-tightener's.
         let cut = if index == NO_LOAD { self.lost } else { 0.0 };
@@ -214,38 +214,14 @@ impl Document<'_> {
     }
 
     fn contact_parameters(&self) -> Vec<Parameter> {
-        let rig = &self.scenario.rig;
-        let share = rig.plant.top_load_share.max(1e-9);
-        let zero_code = rig.sense.angle_zero_code;
-        let itself = |x: f64| x;
-        let pressed = "compression under known preload, at rest";
-        let rolling = "compression at rest and rolling";
-        let speeds = "compression and lift at several speeds";
-        let arm_zero = |mrad: f64| zero_code + 16_384.0 * 1e-3 * mrad / TURN;
-        let no_load_mm_s = rig.drive.no_load_speed_mm_s;
-        let no_load = |x: f64| no_load_mm_s * x.exp();
-        let all: [(Shown<'_>, &dyn Fn(f64) -> f64); 13] = [
-            ((STIFFNESS, "tread.k_inf_pa_per_m", "Pa/m", pressed), &|x| 1e9 * x.exp()),
-            ((STIFFENING, "tread.stiffening", "", rolling), &f64::exp),
-            ((TAU, "tread.tau_s", "s", speeds), &f64::exp),
-            ((FRICTION, "plant.mu", "", "creep at the climbs, by its law"), &f64::exp),
-            ((LOAD, "plant.top_load_n", "N", "arm thrust and drive effort"), &|x| x.exp() / share),
-            ((GEARBOX, "gearbox friction", "N", "drive effort on the smooth wall"), &itself),
-            ((RADIUS, "rig.wheel_radius_mm", "mm", "shape of the climbs"), &itself),
-            ((LOAD_GAIN, "preload sensor gain", "", "loads against the drive"), &f64::exp),
-            ((TREAD_GAIN, "compression sensor gain", "", "compression against the arm"), &f64::exp),
-            ((CREEP, "plant.elastic_creep", "", "creep at the climbs"), &f64::exp),
-            ((DRIVE, "drive force over nominal", "", "effort against load"), &f64::exp),
-            ((NO_LOAD, "drive.no_load_speed_mm_s", "mm/s", "effort against speed"), &no_load),
-            ((ARM_ZERO, "sense.angle_zero_code", "codes", "arm angle at known radii"), &arm_zero),
-        ];
+        let rows = ROWS.iter().enumerate();
         let mut list: Vec<Parameter> =
-            all.into_iter().map(|(shown, of)| self.parameter(shown, of)).collect();
+            rows.map(|(index, row)| self.parameter(index, row.shown, row.of)).collect();
         for step in 0..self.coordinates.steps() {
             let name = format!("rig.step_positions_mm[{}]", step + 1);
             let by = "turn of the wheel at the climb";
             let index = self.coordinates.position(step);
-            let turned = self.parameter((index, &name, "mm", by), &itself);
+            let turned = self.parameter(index, (&name, "mm", by), itself);
             // The logs determine the turn; the position depends on the radius as well.
             let (value, variance) =
                 self.coordinates.place(step, &self.contact.x, &self.contact.covariance);
@@ -256,7 +232,7 @@ impl Document<'_> {
         for step in 0..self.coordinates.steps() {
             let name = format!("rig.step_height_mm[{}]", step + 1);
             let by = "arm angle before and after";
-            list.push(self.parameter((self.coordinates.height(step), &name, "mm", by), &itself));
+            list.push(self.parameter(self.coordinates.height(step), (&name, "mm", by), itself));
         }
         list
     }

@@ -114,6 +114,9 @@ fn no_command_writes_over_what_it_reads() {
     good_in(at, &["params", "restore", "--file", "set.bin"]);
     let set = std::fs::read(at.join("set.bin")).unwrap();
     refused_in(at, &["params", "save", "set.bin", "--file", "set.bin"], &["save set.bin"]);
+    for key in ["mismatch.friction=0.9", "spread.mu_rel=0.1", "run.seed=3"] {
+        refused_in(at, &["params", "set", key, "--file", "set.bin"], &[key, "what a board holds"]);
+    }
     assert_eq!(set, std::fs::read(at.join("set.bin")).unwrap());
     let known = "identified.toml";
     std::fs::write(at.join(known), "[plant]\nmu = 0.9\n").unwrap();

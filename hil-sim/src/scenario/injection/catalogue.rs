@@ -20,14 +20,14 @@ pub struct Entry {
     pub unit: &'static str,
     /// What happens.
     pub text: &'static str,
-    /// Codes that name it; none where every report does, as where a restart reports it.
-    pub codes: Option<&'static [u16]>,
+    /// Codes that name it; none where a restart reports it.
+    pub codes: &'static [u16],
 }
 
 /// Codes of faults and limits that name such a part. Two that are compared share a code.
-const fn codes(target: Target) -> Option<&'static [u16]> {
+const fn codes(target: Target) -> &'static [u16] {
     use Target::*;
-    Some(match target {
+    match target {
         Encoder | EncoderLineA | EncoderLineB => &[101, 122, 123, 124, 125, 126, 131],
         PreloadSensor | PreloadSensorConverter => &[102, 112, 116, 120, 121, 127, 212],
         CompressionSensor | TreadConverter => &[103, 113, 117, 208, 211, 212],
@@ -43,9 +43,12 @@ const fn codes(target: Target) -> Option<&'static [u16]> {
         Load => &[125],
         Tick => &[160],
         Model => &[141],
-        Log | Commands => &[],
-        _ => return None,
-    })
+        Dma => &[102, 103, 105],
+        // The button's other contact takes the supply from the motors, not from their bridges.
+        StopWire => &[128, 129, 151],
+        Debugger => &[216],
+        _ => &[],
+    }
 }
 
 const fn one(
