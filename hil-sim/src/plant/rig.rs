@@ -21,7 +21,8 @@ use super::rolling::{self, Steady};
 use super::wind_up::WindUp;
 
 pub use energy::Energy;
-pub use truth::{PlantError, Truth};
+pub use super::truth::Truth;
+pub use truth::PlantError;
 
 /// How much farther the screw retreats than each step is high, mm.
 const STEP_ROOM_MM: f64 = 1.0;
