@@ -33,7 +33,8 @@ pub use source::{Bytes, Source, SourceError, Virtual, letter, starter};
 pub(crate) use summary::or_nan;
 pub use summary::{CrossingLine, LedgerLine, LogLine, Recording, Report, Summary};
 pub use tick::{
-    Controller, MODE_NAMES, STAGE_NAMES, Tick, TrueState, mode_number, mode_words, stage_name,
+    Column, Controller, MODE_NAMES, STAGE_NAMES, Tick, TrueState, mode_number, mode_words,
+    stage_name,
 };
 pub use time_lost::TimeLost;
 pub use view::View;

@@ -8,7 +8,7 @@ use hil_sim::scenario::{Direction, Scenario};
 use hil_sim::testing::long;
 use interstage::estimate::ContactStage as Stage;
 use interstage::fault::Fault;
-use interstage::sense::raw::SensorFrame;
+use interstage::sense::raw::SensorId;
 use interstage::supervise::{Command, Leg, Mode, Trigger, next};
 use interstage::tick::Event;
 use interstage::units;
@@ -302,7 +302,7 @@ fn through_every_mode(direction: Direction, pester: bool) -> (Bench, usize) {
         pestered += usize::from(pester && wanted.is_none());
         bench.spoiled(command, |frame| {
             if tick < 50 {
-                frame.arm_angle = None;
+                frame[SensorId::ArmAngle] = None;
             }
             if matches!(mode, Mode::Complete(_) | Mode::FaultHold(_)) && waited > 50 {
                 *frame = *last.get_or_insert(*frame);
@@ -346,23 +346,14 @@ const VISITED: [Visited; 8] = [
     ("fault hold", |mode| matches!(mode, Mode::FaultHold(_))),
 ];
 
-/// A sensor that can fall silent: its name, how its newest code is replaced by an old one,
-/// and the fault that reports it.
-type Silence = (&'static str, fn(&mut SensorFrame, &SensorFrame), Fault);
+/// A sensor that can fall silent, and the fault that reports it.
+type Silence = (SensorId, Fault);
 
 const SENSORS: [Silence; 4] = [
-    ("wheel encoder", |now, old| now.wheel_encoder = old.wheel_encoder, Fault::WheelEncoderStale),
-    (
-        "preload sensor",
-        |now, old| now.preload_sensor = old.preload_sensor,
-        Fault::PreloadSensorStale,
-    ),
-    (
-        "compression sensor",
-        |now, old| now.compression_sensor = old.compression_sensor,
-        Fault::CompressionSensorStale,
-    ),
-    ("arm angle", |now, old| now.arm_angle = old.arm_angle, Fault::ArmAngleStale),
+    (SensorId::WheelEncoder, Fault::WheelEncoderStale),
+    (SensorId::PreloadSensor, Fault::PreloadSensorStale),
+    (SensorId::CompressionSensor, Fault::CompressionSensorStale),
+    (SensorId::ArmAngle, Fault::ArmAngleStale),
 ];
 
 /// The sensor is silent for so long from now on.
@@ -371,7 +362,7 @@ fn silence(bench: &mut Bench, sensor: &Silence, ms: u32) {
     for _ in 0..ms {
         bench.spoiled(None, |frame| {
             let old = *last.get_or_insert(*frame);
-            sensor.1(frame, &old);
+            frame[sensor.0] = old[sensor.0];
         });
     }
 }

@@ -269,6 +269,7 @@ impl Judge {
 
 #[cfg(test)]
 mod tests {
+    use interstage::sense::raw::SensorId;
     use interstage::supervise::Leg;
     use interstage::tick::Entry;
     use interstage::units::{MotorCommand, Q16};
@@ -338,7 +339,8 @@ mod tests {
     fn what_does_not_name_the_fault_is_found_as_something_else() {
         let finding = |codes: &[u16]| {
             let mut scenario = Scenario::default();
-            scenario.run.faults = vec![Injection::at(Target::Sensor(SensorId::WheelEncoder), Kind::Gain, 0.0, 1.5)];
+            scenario.run.faults =
+                vec![Injection::at(Target::Sensor(SensorId::WheelEncoder), Kind::Gain, 0.0, 1.5)];
             let mut judge = Judge::new(&scenario, &Truth::default());
             judge.mode = Mode::Complete(Direction::Retract);
             judge.rest_s = Some(1.0);

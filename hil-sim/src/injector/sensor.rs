@@ -7,9 +7,7 @@ use std::collections::VecDeque;
 
 use interstage::rig::Rig;
 use interstage::sense::angle::decode;
-use interstage::sense::raw::{
-    AngleFrame, BridgeCode, BridgeCodes, EncoderCount, SensorFrame, SensorId,
-};
+use interstage::sense::raw::{AngleFrame, BridgeCode, BridgeCodes, EncoderCount, SensorFrame};
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
@@ -103,9 +101,7 @@ impl FaultySensor {
         let given = match self.kind {
             Kind::Stuck => first,
             // The counter has no zero of its own: it goes wrong from where it was.
-            Kind::Gain if self.counter.is_some() => {
-                first + (truth - first) * self.magnitude
-            }
+            Kind::Gain if self.counter.is_some() => first + (truth - first) * self.magnitude,
             Kind::Gain => self.zero + (truth - self.zero) * self.magnitude,
             Kind::Offset => truth + self.magnitude,
             Kind::Slow => {
@@ -196,7 +192,7 @@ fn readback(target: Target, codes: &mut BridgeCodes) -> Option<&mut BridgeCode> 
 
 #[cfg(test)]
 mod tests {
-    use interstage::sense::raw::Sample;
+    use interstage::sense::raw::{Sample, SensorId};
     use rand::SeedableRng;
 
     use super::*;

@@ -20,8 +20,8 @@ use super::ring::{Ring, Work};
 use super::rolling::{self, Steady};
 use super::wind_up::WindUp;
 
-pub use energy::Energy;
 pub use super::truth::Truth;
+pub use energy::Energy;
 pub use truth::PlantError;
 
 /// How much farther the screw retreats than each step is high, mm.

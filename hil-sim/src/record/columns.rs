@@ -74,17 +74,17 @@ mod tests {
     use super::*;
     use crate::record::Controller;
     use interstage::log::Record;
-    use interstage::sense::raw::{Sample, SensorFrame};
+    use interstage::sense::raw::{Sample, SensorFrame, SensorId};
 
     #[test]
     fn every_frame_of_the_arm_comes_back_and_its_code_has_no_parity() {
         for bits in 0..=u16::MAX {
-            let sample = Sample { code: AngleFrame::new(bits), at: 9 };
-            let sensors = SensorFrame { arm_angle: Some(sample), ..SensorFrame::default() };
+            let mut sensors = SensorFrame::default();
+            sensors[SensorId::ArmAngle] = Some(Sample { code: bits, at: 9 });
             let tick = Controller::of(&Record::default(), &sensors);
             assert_eq!(tick.sensors(), sensors, "{bits:#06x}");
             assert_eq!(tick.arm_angle_code, Some(bits & 0x3FFF));
-            let is_good = interstage::sense::angle::decode(sample.code).is_ok();
+            let is_good = interstage::sense::angle::decode(AngleFrame::new(bits)).is_ok();
             assert_eq!(tick.arm_angle_error == 0, is_good, "{bits:#06x}");
         }
     }

@@ -1,5 +1,7 @@
 use std::path::Path;
 
+use interstage::sense::raw::SensorId;
+
 use super::injection::{Injection, Kind, Target};
 use super::*;
 

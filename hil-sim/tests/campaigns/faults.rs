@@ -5,6 +5,7 @@ use hil_sim::faults::campaign::{Case, FaultCampaign, MatrixRow, Outcome, twin, w
 use hil_sim::scenario::Scenario;
 use hil_sim::scenario::injection::{Injection, Kind, Target};
 use hil_sim::session::{Options, run};
+use interstage::sense::raw::SensorId;
 
 fn campaign_on(scenario: Scenario, instants: usize, wanted: impl Fn(&str) -> bool) -> Outcome {
     let cases = Case::all().into_iter().filter(|case| wanted(&case.name())).collect();
@@ -91,7 +92,12 @@ fn an_encoder_that_counts_too_few_is_not_taken_for_a_load() {
     for (seed, at_s) in [(32, 1.211), (35, 1.147)] {
         let mut scenario = Scenario::default();
         scenario.run.seed = seed;
-        scenario.run.faults = vec![Injection::at(Target::Sensor(SensorId::WheelEncoder), Kind::Gain, at_s, 2.0 / 3.0)];
+        scenario.run.faults = vec![Injection::at(
+            Target::Sensor(SensorId::WheelEncoder),
+            Kind::Gain,
+            at_s,
+            2.0 / 3.0,
+        )];
         let summary = run(&scenario, Options::default()).expect("a run").summary;
         let fault = summary.faults.first().expect("a fault");
         assert!(fault.code == 125 && fault.t_s < at_s + 1.0, "{fault:?}");
@@ -109,7 +115,8 @@ fn the_whole_top_load_on_one_wheel_is_a_load() {
 fn a_compression_sensor_that_is_far_off_from_before_boot_is_reported() {
     let reported = |preset: &str, gain: f64| {
         let mut scenario = Scenario::named(preset).expect("a preset");
-        scenario.run.faults = vec![Injection::at(Target::Sensor(SensorId::CompressionSensor), Kind::Gain, 0.0, gain)];
+        scenario.run.faults =
+            vec![Injection::at(Target::Sensor(SensorId::CompressionSensor), Kind::Gain, 0.0, gain)];
         let summary = run(&scenario, Options::default()).expect("a run").summary;
         // At rest, by the gap of the first crossing, or by steps that are not in their places.
         let limited = summary.limits.iter().any(|limit| matches!(limit.code, 211 | 212));
