@@ -20,6 +20,7 @@ mod time_lost;
 mod view;
 mod write;
 
+pub use columns::Column;
 pub use csv_file::{Metadata, write_metadata};
 pub use decoder::{Counts, Decoder, Item, Mark};
 pub use joined::JoinedLog;
@@ -33,8 +34,7 @@ pub use source::{Bytes, Source, SourceError, Virtual, letter, starter};
 pub(crate) use summary::or_nan;
 pub use summary::{CrossingLine, LedgerLine, LogLine, Recording, Report, Summary};
 pub use tick::{
-    Column, Controller, MODE_NAMES, STAGE_NAMES, Tick, TrueState, mode_number, mode_words,
-    stage_name,
+    Controller, MODE_NAMES, STAGE_NAMES, Tick, TrueState, mode_number, mode_words, stage_name,
 };
 pub use time_lost::TimeLost;
 pub use view::View;

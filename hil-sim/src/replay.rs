@@ -247,20 +247,17 @@ const STAGES: [&str; 8] =
     ["sensing", "odometry", "mode", "contact", "plan", "schedule", "loops", "vibration"];
 
 /// Columns beside the quantities, and the stages that give them.
-const OTHERS: [(&str, &str); 7] = [
-    ("mode", "mode"),
-    ("retracts", "mode"),
-    ("fault", "mode"),
-    ("stage", "contact"),
-    ("level", "contact"),
-    ("drive_duty", "loops"),
-    ("pretightener_duty", "loops"),
+const OTHERS: [(&str, &[&str]); 3] = [
+    ("mode", &["mode", "retracts", "fault"]),
+    ("contact", &["stage", "level"]),
+    ("loops", &["drive_duty", "pretightener_duty"]),
 ];
 
 /// The columns that a stage gives.
 fn given_by(stage: &str) -> impl Iterator<Item = &'static str> {
-    let quantities = Columns::QUANTITIES.iter().map(|column| (column.name, column.stage));
-    OTHERS.into_iter().chain(quantities).filter(move |one| one.1 == stage).map(|one| one.0)
+    let others = OTHERS.into_iter().filter(move |one| one.0 == stage).flat_map(|one| one.1);
+    let quantities = Columns::QUANTITIES.iter().filter(move |column| column.stage == stage);
+    others.copied().chain(quantities.map(|column| column.name))
 }
 
 /// Whether the board reports it, not the controller.

@@ -50,12 +50,9 @@ const fn halves(word: u32) -> [u16; 2] {
 }
 
 /// The first of these values.
-fn filled<T: Copy + Default, const N: usize>(values: impl IntoIterator<Item = T>) -> [T; N] {
-    let mut all = [T::default(); N];
-    for (place, value) in all.iter_mut().zip(values) {
-        *place = value;
-    }
-    all
+fn filled<T: Default, const N: usize>(values: impl IntoIterator<Item = T>) -> [T; N] {
+    let mut values = values.into_iter();
+    core::array::from_fn(|_| values.next().unwrap_or_default())
 }
 
 impl DeltaRecord {

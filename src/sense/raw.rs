@@ -2,6 +2,8 @@
 
 use core::ops::{Index, IndexMut};
 
+use serde::{Deserialize, Serialize};
+
 use crate::units::Tick;
 
 /// Declares raw codes of 16 bits.
@@ -102,7 +104,7 @@ pub struct Sample<T> {
 }
 
 /// Passes the sensors to the macro `$then`, behind what else it is given: each with its text, its
-/// name, the ticks from one reading to the next, and its columns in the log: the code, what may be
+/// name and that in a scenario's faults, the ticks from one reading to the next, and its columns in the log: the code, what may be
 /// wrong with it, and the tick at which it was taken.
 ///
 /// The order is that of codes in frames and messages, of the tasks, and of the bits of
@@ -112,24 +114,24 @@ macro_rules! sensors {
     ($then:ident $($given:tt)*) => {
         $then! { $($given)*
             /// Wheel encoder: its counter, 16 bits, wraps.
-            WheelEncoder "wheel encoder", 1: wheel_encoder_code, wheel_encoder_at;
+            WheelEncoder "wheel encoder" "encoder", 1: wheel_encoder_code, wheel_encoder_at;
             /// Preload sensor between pre-tightener and arm: code of the converter.
-            PreloadSensor "preload sensor", 1: preload_code, preload_at;
+            PreloadSensor "preload sensor" "preload-sensor", 1: preload_code, preload_at;
             /// Compression sensor of the tread, between arm and wheel: code of the converter.
-            CompressionSensor "compression sensor", 1: compression_code, compression_at;
+            CompressionSensor "compression sensor" "compression-sensor", 1: compression_code, compression_at;
             /// Arm angle sensor at the pillar: its 14-bit code, 16384 a turn.
-            ArmAngle "arm angle", 2: arm_angle_code (arm_angle_error), arm_angle_at;
+            ArmAngle "arm angle" "angle", 2: arm_angle_code (arm_angle_error), arm_angle_at;
         }
     };
 }
 
 macro_rules! sensor_id {
-    ($($(#[$doc:meta])* $id:ident $name:literal, $period:literal:
+    ($($(#[$doc:meta])* $id:ident $name:literal $fault:literal, $period:literal:
         $code:ident $(($error:ident))?, $at:ident;)*) => {
         /// A sensor.
-        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
         pub enum SensorId {
-            $($(#[$doc])* $id,)*
+            $($(#[$doc])* #[serde(rename = $fault)] $id,)*
         }
 
         impl SensorId {

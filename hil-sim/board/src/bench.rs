@@ -259,16 +259,16 @@ impl<'a> Bench<'a> {
     fn set_sensors(&mut self, codes: Codes) {
         let codes = self.wiring.codes(codes);
         // Noise on the lines can exceed the wheel's own speed.
-        let [count, before] =
-            [codes, self.codes].map(|codes| EncoderCount::new(codes[SensorId::WheelEncoder]));
+        let [count, before] = [codes, self.codes]
+            .map(|codes| EncoderCount::new(codes.sensors[SensorId::WheelEncoder as usize]));
         let turned = count.since(before).clamp(-MOST_COUNTS, MOST_COUNTS);
         self.wheel += i64::from(turned);
         self.codes = codes;
         let chip = self.machine.chip_mut();
         // The readback converts with 12 of the 16 bits.
         let bridges = [codes.bridges.drive, codes.bridges.pretightener].map(|code| code.get() << 4);
-        chip.set_analog(SensorId::ANALOG.map(|sensor| codes[sensor]), bridges);
-        chip.angle.angle = codes[SensorId::ArmAngle];
+        chip.set_analog(SensorId::ANALOG.map(|sensor| codes.sensors[sensor as usize]), bridges);
+        chip.angle.angle = codes.sensors[SensorId::ArmAngle as usize];
         chip.turn_wheel(self.wheel, STEP);
     }
 

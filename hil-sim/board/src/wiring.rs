@@ -166,10 +166,10 @@ impl Wiring {
     /// What the board gets of what the sensors and bridges give.
     pub fn codes(&self, mut codes: Codes) -> Codes {
         codes.bridges = self.readback(codes.bridges);
-        let [preload, compression] = [SensorId::PreloadSensor, SensorId::CompressionSensor];
-        codes[SensorId::ArmAngle] = self.arm(codes[SensorId::ArmAngle]);
-        let places = (preload, compression);
-        let [mut preload, mut compression] = [preload, compression].map(|at| codes[at].into());
+        let arm = &mut codes.sensors[SensorId::ArmAngle as usize];
+        *arm = self.arm(*arm);
+        let places = [SensorId::PreloadSensor, SensorId::CompressionSensor].map(|s| s as usize);
+        let [mut preload, mut compression] = places.map(|at| i32::from(codes.sensors[at]));
         if self.has(Mistake::PreloadReversed) {
             preload = 2 * ZERO - preload;
         }
@@ -190,7 +190,7 @@ impl Wiring {
             std::mem::swap(&mut preload, &mut compression);
         }
         let code = |code: i32| code.clamp(0, 65_535) as u16;
-        (codes[places.0], codes[places.1]) = (code(preload), code(compression));
+        (codes.sensors[places[0]], codes.sensors[places[1]]) = (code(preload), code(compression));
         codes
     }
 

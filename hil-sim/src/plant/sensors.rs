@@ -3,10 +3,8 @@
 
 use std::collections::VecDeque;
 use std::f64::consts::TAU;
-use std::ops::{Index, IndexMut};
 
 use documented::DocumentedFields;
-use interstage::hal::hil::Given;
 use interstage::rig::Rig;
 use interstage::sense::raw::{BridgeCode, BridgeCodes, Sample, SensorFrame, SensorId};
 use rand::SeedableRng;
@@ -44,23 +42,17 @@ impl Coding {
 
 /// A sensor of the plant, and how a fault distorts it.
 pub struct SensorModel {
-    /// Its name in faults.
-    pub name: &'static str,
     pub coding: Coding,
     /// The quantity that it measures.
     truth: fn(&Truth) -> f64,
-    /// Age of a reading when it is handed over, s.
-    delay_s: fn(&Noise) -> f64,
-    /// Standard deviation of its noise.
-    noise: fn(&Noise) -> f64,
+    /// Age of a reading when it is handed over, s, and standard deviation of its noise.
+    noise: fn(&Noise) -> (f64, f64),
     /// Its number in codes, of the quantity and its noise.
     number: fn(&SensorParameters, f64, f64) -> f64,
     /// Codes of a unit of an offset, and the code of zero.
     pub scale: fn(&Rig) -> (f64, f64),
-    /// Gain of a fault, by default.
-    pub gain: f64,
-    /// Offset of a fault: by default and at most, its unit and what it does.
-    pub offset: (f64, f64, &'static str, &'static str),
+    /// Faults: gain by default; offset by default and at most, its unit and what it does.
+    pub faults: (f64, (f64, f64, &'static str, &'static str)),
     /// Codes of faults and limits that name the sensor.
     pub reports: &'static [u16],
 }
@@ -89,51 +81,39 @@ fn bridge_scale(full_scale: f64) -> (f64, f64) {
 /// Every sensor, by [`SensorId`].
 pub static SENSORS: [SensorModel; SensorId::COUNT] = [
     SensorModel {
-        name: "encoder",
         coding: Coding::Counter,
         truth: |t| t.rotation_rad,
-        delay_s: |_| 0.0,
-        noise: |n| n.wheel_encoder_jitter_counts,
+        noise: |n| (0.0, n.wheel_encoder_jitter_counts),
         number: |p, rad, noise| rad / TAU * p.counts_per_turn + noise,
         scale: |rig| (rig.sense.encoder_counts / (TAU * rig.rig.wheel_radius_mm), 0.0),
-        gain: 1.5,
-        offset: (2.0, 100.0, "mm", "jumps by so much once"),
+        faults: (1.5, (2.0, 100.0, "mm", "jumps by so much once")),
         reports: &[101, 122, 123, 124, 125, 126, 131],
     },
     SensorModel {
-        name: "preload-sensor",
         coding: Coding::Converter,
         truth: |t| t.preload_n,
-        delay_s: |n| n.preload_sensor_delay_s,
-        noise: |n| n.preload_sensor_n,
+        noise: |n| (n.preload_sensor_delay_s, n.preload_sensor_n),
         number: |p, n, noise| bridge((n * p.preload_sensor_gain + noise) / p.preload_full_scale_n),
         scale: |rig| bridge_scale(rig.sense.preload_full_scale_n),
-        gain: 1.2,
-        offset: (6.0, 200.0, "N", MORE),
+        faults: (1.2, (6.0, 200.0, "N", MORE)),
         reports: &[102, 112, 116, 120, 121, 127, 212],
     },
     SensorModel {
-        name: "compression-sensor",
         coding: Coding::Converter,
         truth: |t| t.compression_mm,
-        delay_s: |n| n.compression_sensor_delay_s,
-        noise: |n| n.compression_sensor_mm,
+        noise: |n| (n.compression_sensor_delay_s, n.compression_sensor_mm),
         number: |p, mm, noise| bridge((mm * p.tread_gain + noise) / p.tread_full_scale_mm),
         scale: |rig| bridge_scale(rig.sense.tread_full_scale_mm),
-        gain: 1.2,
-        offset: (0.3, 5.0, "mm", MORE),
+        faults: (1.2, (0.3, 5.0, "mm", MORE)),
         reports: &[103, 113, 117, 208, 211, 212],
     },
     SensorModel {
-        name: "angle",
         coding: Coding::Angle,
         truth: |t| t.arm_rad,
-        delay_s: |n| n.arm_angle_delay_s,
-        noise: |n| n.arm_angle_lsb,
+        noise: |n| (n.arm_angle_delay_s, n.arm_angle_lsb),
         number: |p, rad, noise| (rad + p.angle_zero_rad) / TAU * TURN + p.angle_zero_code + noise,
         scale: |rig| (TURN / 360.0, rig.sense.angle_zero_code),
-        gain: 1.2,
-        offset: (1.0, 90.0, "deg", MORE),
+        faults: (1.2, (1.0, 90.0, "deg", MORE)),
         reports: &[104, 106, 114, 126, 131],
     },
 ];
@@ -203,30 +183,10 @@ impl Codes {
     pub fn put(&self, frame: &mut SensorFrame, at: u32) {
         for sensor in SensorId::ALL {
             if at.is_multiple_of(SensorId::PERIODS[sensor as usize]) {
-                frame[sensor] = Some(Sample { code: self[sensor], at });
+                frame[sensor] = Some(Sample { code: self.sensors[sensor as usize], at });
             }
         }
         frame.bridges = Some(self.bridges);
-    }
-}
-
-impl Index<SensorId> for Codes {
-    type Output = u16;
-
-    fn index(&self, sensor: SensorId) -> &u16 {
-        &self.sensors[sensor as usize]
-    }
-}
-
-impl IndexMut<SensorId> for Codes {
-    fn index_mut(&mut self, sensor: SensorId) -> &mut u16 {
-        &mut self.sensors[sensor as usize]
-    }
-}
-
-impl From<Codes> for Given {
-    fn from(codes: Codes) -> Self {
-        Self::codes(codes.sensors, codes.bridges)
     }
 }
 
@@ -294,11 +254,11 @@ impl Sensors {
         let sensors = SensorId::ALL.map(|sensor| {
             let (place, sensor) = (sensor as usize, &SENSORS[sensor as usize]);
             let oldest = past.len() - 1;
-            let back = ((sensor.delay_s)(&p.noise) / dt_s).clamp(0.0, oldest as f64);
+            let (delay_s, deviation) = (sensor.noise)(&p.noise);
+            let back = (delay_s / dt_s).clamp(0.0, oldest as f64);
             let at = back as usize;
             let (newer, older) = (past[at][place], past[(at + 1).min(oldest)][place]);
             let truth = newer + (older - newer) * (back - at as f64);
-            let deviation = (sensor.noise)(&p.noise);
             // None is drawn for a sensor without noise.
             let noise = if deviation == 0.0 {
                 0.0

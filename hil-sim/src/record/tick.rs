@@ -16,7 +16,9 @@ use interstage::units::{Duty, Q16};
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize};
 
-use super::columns::{ANGLE, angle_error, angle_frame, bit, mode_column, stage_column};
+use super::columns::{
+    ANGLE, Cell, Column, angle_error, angle_frame, bit, mode_column, stage_column,
+};
 use super::summary::nan;
 use crate::plant::rig::Truth;
 
@@ -108,63 +110,8 @@ impl<'de> Deserialize<'de> for Tick {
     }
 }
 
-/// The controller's distance when no face is left.
-const NO_FACE: Q16 = Q16::MAX;
-
 /// One in the format of a duty.
 const DUTY: f64 = 32_768.0;
-
-/// A quantity in a column.
-trait Cell: Copy {
-    /// Of a tick that did not run, or a log without the column.
-    const UNKNOWN: Self;
-    fn of(quantity: Q16) -> Self;
-    fn quantity(self) -> Option<Q16>;
-    fn number(self) -> f64;
-}
-
-impl Cell for f64 {
-    const UNKNOWN: Self = Self::NAN;
-
-    fn of(quantity: Q16) -> Self {
-        quantity.to_num()
-    }
-
-    fn quantity(self) -> Option<Q16> {
-        (!self.is_nan()).then(|| Q16::from_num(self))
-    }
-
-    fn number(self) -> f64 {
-        self
-    }
-}
-
-impl Cell for Option<f64> {
-    const UNKNOWN: Self = None;
-
-    fn of(quantity: Q16) -> Self {
-        (quantity != NO_FACE).then(|| quantity.to_num())
-    }
-
-    fn quantity(self) -> Option<Q16> {
-        Some(self.map_or(NO_FACE, Q16::from_num))
-    }
-
-    fn number(self) -> f64 {
-        self.unwrap_or(f64::NAN)
-    }
-}
-
-/// A quantity of the controller.
-pub struct Column {
-    pub name: &'static str,
-    /// The stage of the tick that gives it.
-    pub stage: &'static str,
-    /// The plot that shows it and the name of its curve.
-    pub curve: Option<(&'static str, &'static str)>,
-    /// Its value, `NaN` if unknown.
-    pub of: fn(&Controller) -> f64,
-}
 
 macro_rules! with_quantities {
     ($($sensors:tt)*) => { interstage::quantities!(controller { $($sensors)* }); };
@@ -172,7 +119,7 @@ macro_rules! with_quantities {
 
 /// Declares the columns of sensors and quantities, and what is made of them.
 macro_rules! controller {
-    ({ $($(#[$about:meta])* $id:ident $called:literal, $period:literal:
+    ({ $($(#[$about:meta])* $id:ident $called:literal $fault:literal, $period:literal:
         $code:ident $(($error:ident))?, $at:ident;)* }
     $($(#[$doc:meta])* $field:ident: $unit:ty, $column:ident: $cell:ty, $stage:literal
         $(, $plot:literal $curve:literal)?;)*) => {
@@ -237,7 +184,7 @@ macro_rules! controller {
                 name: stringify!($column),
                 stage: $stage,
                 curve: [$(Some(($plot, $curve)),)? None][0],
-                of: |row| row.$column.number(),
+                of: |row| row.$column.quantity().map_or(f64::NAN, Q16::to_num),
             }),*];
 
             /// A tick that did not run, or is not in the log.

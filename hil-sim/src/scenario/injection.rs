@@ -157,28 +157,8 @@ pub enum Target {
     Magnet,
     StopWire,
     OptionBytes,
-    /// A sensor, by its name in [`SENSORS`].
     #[serde(untagged)]
-    Sensor(#[serde(with = "sensor_name")] SensorId),
-}
-
-mod sensor_name {
-    use interstage::sense::raw::SensorId;
-    use serde::de::Error as _;
-    use serde::{Deserialize, Deserializer, Serializer};
-
-    use crate::plant::sensors::SENSORS;
-
-    pub(super) fn serialize<S: Serializer>(sensor: &SensorId, to: S) -> Result<S::Ok, S::Error> {
-        to.serialize_str(SENSORS[*sensor as usize].name)
-    }
-
-    pub(super) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<SensorId, D::Error> {
-        let name = String::deserialize(from)?;
-        let is = |sensor: &SensorId| SENSORS[*sensor as usize].name == name;
-        let found = SensorId::ALL.into_iter().find(is);
-        found.ok_or_else(|| D::Error::custom(format!("no such target: {name}")))
-    }
+    Sensor(SensorId),
 }
 
 /// How it breaks.

@@ -165,7 +165,7 @@ fn codes_stop_at_the_converters_ends() {
     let mut chain = Chain::new(Noise::default());
     let mut codes = |preload_n| {
         let codes = chain.read(Truth { preload_n, ..Truth::default() });
-        codes[SensorId::PreloadSensor]
+        codes.sensors[SensorId::PreloadSensor as usize]
     };
     assert_eq!((codes(1e6), codes(-1e6)), (u16::MAX, 0));
 }

@@ -70,19 +70,19 @@ struct Converter(Rc<Shared>, SensorId);
 
 impl WheelEncoder for Peripheral {
     fn count(&mut self) -> EncoderCount {
-        EncoderCount::new(self.0.codes()[SensorId::WheelEncoder])
+        EncoderCount::new(self.0.codes().sensors[SensorId::WheelEncoder as usize])
     }
 }
 
 impl AnalogInput for Converter {
     async fn sample(&mut self) -> Result<AdcCode, BusFault> {
-        Ok(AdcCode::new(self.0.codes()[self.1]))
+        Ok(AdcCode::new(self.0.codes().sensors[self.1 as usize]))
     }
 }
 
 impl AngleBus for Peripheral {
     async fn frame(&mut self) -> Result<AngleFrame, BusFault> {
-        Ok(AngleFrame::new(self.0.codes()[SensorId::ArmAngle]))
+        Ok(AngleFrame::new(self.0.codes().sensors[SensorId::ArmAngle as usize]))
     }
 }
 

@@ -82,8 +82,7 @@ fn intermittent(target: Target) -> Entry {
 /// Wrong codes of a sensor or readback: its gain, and its offset with range, unit and text.
 fn distorted(
     target: Target,
-    times: f64,
-    (offset, most, unit, text): (f64, f64, &'static str, &'static str),
+    (times, (offset, most, unit, text)): (f64, (f64, f64, &'static str, &'static str)),
 ) -> [Entry; 6] {
     let gain = "reads so many times what is true, from its zero";
     [
@@ -120,12 +119,12 @@ pub static CATALOGUE: LazyLock<Vec<Entry>> = LazyLock::new(|| {
     let mut all = Vec::new();
     for (sensor, model) in SensorId::ALL.into_iter().map(Sensor).zip(&SENSORS) {
         all.push(plain(sensor, Off, SILENT));
-        all.extend(distorted(sensor, model.gain, model.offset));
+        all.extend(distorted(sensor, model.faults));
         all.push(intermittent(sensor));
     }
     all.extend([plain(Readback, Off, SILENT), intermittent(Readback)]);
     for readback in [DriveReadback, PretightenerReadback] {
-        all.extend(distorted(readback, 1.2, (0.1, 2.5, "duty", MORE)));
+        all.extend(distorted(readback, (1.2, (0.1, 2.5, "duty", MORE))));
     }
     all.extend([Drive, Pretightener].into_iter().flat_map(actuator));
     let torn = "a sector of 40 degrees keeps this part of its stiffness";
