@@ -65,7 +65,7 @@ impl Fault {
         let chip = machine.chip_mut();
         match self {
             Self::StuckCode(input, code) => {
-                chip.defects.stuck_codes[input & 3] = on.then_some(code);
+                chip.defects.stuck_codes[input] = on.then_some(code);
             }
             Self::BitErrors(bits) => chip.angle.bit_errors = if on { bits } else { 0 },
             Self::AngleLost => chip.angle.lost = on,

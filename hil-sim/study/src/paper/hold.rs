@@ -16,7 +16,7 @@ use crate::reference::beam::BeamError;
 use crate::reference::vibration::Arm;
 use hil_sim::plant::balance::{Axial, BalanceError};
 use hil_sim::plant::crossing::{CrossingCase, cross};
-use hil_sim::plant::spread::Noise;
+use hil_sim::plant::sensors::Noise;
 use hil_sim::plant::spread::Section;
 use hil_sim::rollout::{CrossingSetup, Wheel};
 
