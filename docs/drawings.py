@@ -84,7 +84,7 @@ class Drawing:
         (x0, y0), (x1, y1) = points[-2:]
         self.head(x1, y1, x1 - x0, y1 - y0, color)
 
-    def text(self, x, y, *lines, size=22, color=INK, anchor="start", weight="normal"):
+    def text(self, x, y, *lines, size=23, color=INK, anchor="start", weight="normal"):
         for i, line in enumerate(lines):
             line = line.replace("&", "&amp;").replace("<", "&lt;")
             self.items.append(
@@ -96,7 +96,7 @@ class Drawing:
         self.box(x, y, width, height, fill=fill)
         top = y + height / 2 + 7 - 12 * len(lines)
         self.text(x + width / 2, top, name, anchor="middle", weight="bold")
-        self.text(x + width / 2, top + 25, *lines, size=20, anchor="middle", color=SOFT)
+        self.text(x + width / 2, top + 26, *lines, size=23, anchor="middle", color=SOFT)
 
     def svg(self):
         width, height = self.size
@@ -201,7 +201,7 @@ def crossing():
     d.line(root, at(*end), color=RED, width=6)
     d.line(at(-1.0, 1.9), at(-3.4, 6.8), color=RED, width=1.5)
     d.text(*at(-10.7, 8.6), "gap 2.65 mm", size=26, color=RED, weight="bold")
-    d.text(*at(-10.7, 7.4), "root to circle", size=22, color=RED)
+    d.text(*at(-10.7, 7.4), "root to circle", color=RED)
     # Names of the step's parts.
     for point, label, x, y in (((0.25, H), "corner", 165, 398), ((0.15, 2.0), "face", 60, 526),
                                ((0, 0), "root", 60, 604)):
@@ -211,7 +211,7 @@ def crossing():
     d.circle(*at(0, H), 7, fill=BLUE, color=BLUE)
     d.circle(*root, 7, fill=RED, color=RED)
     d.arrow((955, root[1]), at(13.25, H), both=True, color=SOFT)
-    d.text(945, 530, "h = 4 mm", size=22, anchor="end", color=SOFT)
+    d.text(945, 530, "h = 4 mm", anchor="end", color=SOFT)
     # Distances before the face.
     d.line(root, at(0, -6.9), color=SOFT, width=1.5, dash="7 5")
     d.arrow(at(-LIFT_OFF, -1.3), at(0, -1.3), both=True)
@@ -226,16 +226,18 @@ def crossing():
 
 
 def stages():
-    """The six contact stages side by side."""
-    d = Drawing(1200, 400, "The six contact stages")
+    """The six contact stages in two rows."""
+    d = Drawing(600, 760, "The six contact stages")
     names = [("initial", "no preload"), ("preloaded", "P rises at rest"),
              ("static friction", "both walls carry"), ("sliding", "corner carries"),
              ("rolling", "onto next wall"), ("continuous", "rolls on a wall")]
-    mm, low = 3.3, 245
-    for left in (200, 600, 1000):
-        d.area((left, 0), (left + 200, 0), (left + 200, 400), (left, 400), fill="#f6f8fa")
+    mm = 3.3
     for i, (name, what) in enumerate(names):
-        left = 200 * i
+        left, top = 200 * (i % 3), 360 * (i // 3)
+        low = top + 245
+        if i % 2:
+            d.area((left, top), (left + 200, top), (left + 200, top + 360), (left, top + 360),
+                   fill="#f6f8fa")
         face = left + {2: 138, 3: 132, 4: 104}[i] if 2 <= i <= 4 else None
         back = [(left + 8, low), (left + 192, low)]
         if face:
@@ -255,10 +257,10 @@ def stages():
         for carries, point in ((i in (1, 2, 5), (x, low + 1)), (i in (2, 3, 4), (face, low - H * mm))):
             if carries:
                 d.circle(*point, 8, fill=RED, color=RED)
-        d.text(left + 100, 46, str(i + 1), size=36, weight="bold", anchor="middle")
-        d.text(left + 100, 314, name, size=25, anchor="middle", weight="bold")
-        d.text(left + 100, 350, what, size=23, anchor="middle", color=SOFT)
-    d.text(600, 388, "● where the wall carries the wheel", size=22, anchor="middle", color=RED)
+        d.text(left + 100, top + 46, str(i + 1), size=36, weight="bold", anchor="middle")
+        d.text(left + 100, top + 314, name, size=25, anchor="middle", weight="bold")
+        d.text(left + 100, top + 346, what, size=23, anchor="middle", color=SOFT)
+    d.text(300, 746, "● where the wall carries the wheel", size=22, anchor="middle", color=RED)
     return d
 
 
@@ -348,8 +350,7 @@ def data():
     d.arrow((630, 119), (710, 119))
     d.arrow((500, 174), (500, 226))
     d.arrow((630, 281), (710, 281))
-    d.text(824, 388, "RTT up 1: 37 kB/s, 4 KiB; never waits for a reader", color=BLUE, anchor="end",
-           size=21)
+    d.text(824, 388, "RTT up 1: 37 kB/s, 4 KiB; never waits for a reader", color=BLUE, anchor="end")
     d.area((10, 408), (990, 408), (990, 790), (10, 790), fill="#f2eefa")
     d.text(26, 440, "host", color=SOFT)
     d.arrow((840, 336), (840, 452), color=BLUE, width=4)

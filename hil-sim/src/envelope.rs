@@ -243,6 +243,6 @@ mod tests {
         assert_ne!(cell(true, 1.3, 0.0).duration_s, cell(false, 1.3, 0.0).duration_s);
         let drawn = picture(&found);
         assert!(drawn.starts_with("<svg") && drawn.contains("reactive"));
-        assert!(drawn.contains("% of the grid; seconds") && drawn.contains("0.6\n"));
+        assert!(drawn.contains("% of the grid; seconds") && drawn.contains(">0.6</text>"));
     }
 }

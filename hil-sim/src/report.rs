@@ -10,7 +10,7 @@ mod crossings;
 mod decimate;
 mod page;
 pub mod palette;
-pub(crate) mod panel;
+pub mod panel;
 mod panels;
 mod scene;
 pub mod svg;

@@ -4,11 +4,7 @@
 use super::result::{NORMAL_95, Residuals};
 use crate::report::axis::{extent, padded};
 use crate::report::palette;
-use crate::report::panel::{Look, Marks, Panel, Shape, stacked};
-
-/// Width of a picture and height of a row, CSS pixels.
-const WIDTH: u32 = 1040;
-const ROW: u32 = 190;
+use crate::report::panel::{Look, Marks, Panel, Shape, sheet};
 
 pub fn svg(rows: &[&Residuals]) -> String {
     let times = rows.iter().flat_map(|row| row.series.iter().map(|(t, _)| *t));
@@ -18,9 +14,8 @@ pub fn svg(rows: &[&Residuals]) -> String {
             "{}, {}: rms {:.2e} {}, {} values, {:.0} of them independent",
             row.log, row.channel, row.rms, row.unit, row.count, row.independent
         ),
-        // The text lives as long as the process, which ends after the picture.
-        y_name: format!("{} residual, {}", row.channel, row.unit).leak(),
-        x_name: Some("time from boot, s"),
+        y_name: format!("{} residual, {}", row.channel, row.unit),
+        x_name: "time from boot, s".to_owned(),
         x,
         marks: vec![Marks {
             name: row.channel.into(),
@@ -36,8 +31,7 @@ pub fn svg(rows: &[&Residuals]) -> String {
         levels: [-1.0, 1.0].map(|end| ("95 %", Look::Limit, end * NORMAL_95 * row.rms)).to_vec(),
         ..Panel::default()
     };
-    let size = (WIDTH, ROW * rows.len() as u32);
-    stacked(size, &mut rows.iter().map(panel).collect::<Vec<_>>())
+    sheet(rows.iter().map(panel).collect(), 1, false)
 }
 
 #[cfg(test)]

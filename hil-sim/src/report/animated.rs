@@ -4,19 +4,19 @@ use std::fmt::Write as _;
 
 use super::crossings::view;
 use super::palette;
-use super::panel::Look;
+use super::panel::{Look, WIDE, ZOOM};
 use super::scene::Scene;
-use super::svg::{escape, hex};
+use super::svg::escape;
 use super::verdict::origin;
 use crate::record::Recording;
 
 /// Size of the picture, CSS pixels.
-const SIZE: (f64, f64) = (640.0, 645.0);
+const SIZE: (f64, f64) = (ZOOM * WIDE, 705.0);
 /// Where the pictures of wheel and corner are, and where the plots begin, with their heights.
 const WHEEL: &str = "y=\"40\" width=\"390\" height=\"300\" viewBox=\"-50 -54 80.6 62\"";
 const CORNER: &str = "x=\"400\" y=\"40\" width=\"240\" height=\"300\" viewBox=\"-11 -15 16 20\"";
 const PLOTS: f64 = 345.0;
-const PLOT: [f64; 2] = [135.0, 165.0];
+const PLOT: [f64; 2] = [145.0, 215.0];
 /// Shown around the first touch and lift-off, s.
 const AROUND_S: (f64, f64) = (0.45, 0.75);
 /// How many times slower than the run, and how long it stops at lift-off, s.
@@ -100,25 +100,27 @@ pub fn animated_svg(recording: &Recording) -> Option<String> {
     for (mut panel, high) in [view.preload(), view.gap()].into_iter().zip(PLOT) {
         panel.title.truncate("Clearance".len());
         // As much as fits its height.
-        panel.y_name = panel.y_name.trim_end_matches(" of reference");
-        panel.x_name = panel.x_name.filter(|_| down > PLOTS);
+        panel.y_name = panel.y_name.trim_end_matches(" of reference").to_owned();
+        if down == PLOTS {
+            panel.x_name.clear();
+        }
         if !scene.measured {
             panel.lines.retain(|line| !matches!(line.look, Look::Measured(_)));
             panel.marks.retain(|marks| marks.name == "true gap");
         }
-        let (plot, [left, right, top, bottom]) = panel.small((SIZE.0, high));
+        let (plot, [left, right, top, bottom]) = panel.alone(high / ZOOM);
         let at = animate(MOVE, &|t| {
             format!("{:.1} 0", left + (t - from) / (to - from) * (right - left))
         });
-        let cursor = hex(palette::GAP);
         let _ = writeln!(
             plots,
-            "<g transform=\"translate(0 {down})\">{plot}<path stroke=\"{cursor}\" \
+            "<g transform=\"translate(0 {down}) scale({ZOOM})\">{plot}<path stroke=\"{}\" \
 stroke-width=\"1.5\" d=\"M0 {top}V{bottom}\">{at}</path></g>",
+            palette::GAP,
         );
         down += high;
     }
-    let [gap, preload] = [hex(palette::GAP), hex(palette::PRELOAD)];
+    let [gap, preload] = [palette::GAP, palette::PRELOAD];
     let (h, reach, hub) = (c.step_mm, scene.gap_ref_mm, 0.7 * r);
     Some(format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{0}\" height=\"{1}\" viewBox=\"0 0 {0} {1}\" \
@@ -134,7 +136,7 @@ font-family=\"sans-serif\" fill=\"#1f2937\">\n<title>A crossing of a simulated r
 <g stroke=\"{preload}\" stroke-width=\"1\" fill=\"none\"><line y2=\"0\">{tail}</line><path d=\"M-1.4 -2.4L0 0L1.4 -2.4\"/></g>\
 <text x=\"2\" y=\"-5\" font-size=\"3\">preload</text></g></svg>\n\
 <svg {CORNER}><rect x=\"-11\" y=\"-15\" width=\"16\" height=\"20\" fill=\"#f4f5f7\"/><use href=\"#crossing\"/>\
-<g font-size=\"0.95\"><text x=\"0.4\" y=\"1.2\" fill=\"{gap}\">clearance{named}</text>\
+<g font-size=\"1\"><text x=\"0.4\" y=\"1.2\" fill=\"{gap}\">clearance{named}</text>\
 <text x=\"-3\" y=\"1.3\" text-anchor=\"end\" fill=\"#287c3c\">reference gap</text></g></svg>\n\
 {words}{plots}</svg>\n",
         SIZE.0,

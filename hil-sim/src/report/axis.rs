@@ -1,46 +1,48 @@
-//! Ranges and tick marks of axes; grid, axes and their text.
-
-use std::ops::Range;
-
-use plotters::chart::MeshStyle;
-use plotters::coord::ranged1d::{DefaultFormatting, KeyPointHint, Ranged};
-use plotters::coord::types::RangedCoordf64;
-use plotters::prelude::DrawingBackend;
-use plotters::style::{Color, TRANSPARENT};
-
-use super::palette;
-use super::svg::size;
+//! Ranges and tick marks of axes.
 
 pub use crate::table::label;
 
-/// An axis with ticks of our own choice.
-pub struct Scale {
-    coord: RangedCoordf64,
-    ticks: Vec<f64>,
+/// What an axis shows.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum Scale {
+    /// A quantity.
+    #[default]
+    Linear,
+    /// The decimal logarithm of a quantity, labelled by the quantity.
+    Log,
+    /// These places alone, with their names: categories, or rows and columns of a map.
+    Named(Vec<(f64, String)>),
 }
 
 impl Scale {
-    /// An axis over `range` with `ticks`.
-    pub fn new(range: (f64, f64), ticks: Vec<f64>) -> Self {
-        Self { coord: (range.0..range.1).into(), ticks }
+    /// Places in `range` and their labels; of a quantity at most so many.
+    pub(super) fn ticks(&self, range: (f64, f64), most: usize) -> Vec<(f64, String)> {
+        match self {
+            Self::Linear => {
+                let (places, decimals) = ticks(range, most);
+                places.into_iter().map(|at| (at, label(at, decimals))).collect()
+            }
+            Self::Log => decades(range),
+            Self::Named(places) => places.clone(),
+        }
     }
 }
 
-impl Ranged for Scale {
-    type FormatOption = DefaultFormatting;
-    type ValueType = f64;
+/// Ticks of decimal logarithms: decades, or 1, 2 and 5 where these are few.
+fn decades((low, high): (f64, f64)) -> Vec<(f64, String)> {
+    let within: &[f64] = if high - low < 2.5 { &[1.0, 2.0, 5.0] } else { &[1.0] };
+    let all = (low.floor() as i32..=high.ceil() as i32)
+        .flat_map(|decade| within.iter().map(move |part| part.log10() + f64::from(decade)));
+    all.filter(|tick| (low..=high).contains(tick)).map(|tick| (tick, power(tick))).collect()
+}
 
-    fn map(&self, value: &f64, limit: (i32, i32)) -> i32 {
-        self.coord.map(value, limit)
-    }
-
-    fn key_points<Hint: KeyPointHint>(&self, hint: Hint) -> Vec<f64> {
-        // The grid asks a second time for finer lines, which are not drawn.
-        if hint.weight().allow_light_points() { Vec::new() } else { self.ticks.clone() }
-    }
-
-    fn range(&self) -> Range<f64> {
-        self.coord.range()
+/// A power of ten with as many digits as it takes.
+fn power(exponent: f64) -> String {
+    let value = 10_f64.powf(exponent);
+    if (1e-3..1e5).contains(&value) {
+        format!("{value:.3}").trim_end_matches('0').trim_end_matches('.').to_owned()
+    } else {
+        format!("{value:.0e}")
     }
 }
 
@@ -61,7 +63,7 @@ pub fn padded(range: (f64, f64), part: f64) -> (f64, f64) {
 
 /// Round numbers inside `range`, at most `most` of them, and how many decimals
 /// distinguish them.
-pub fn ticks(range: (f64, f64), most: usize) -> (Vec<f64>, usize) {
+fn ticks(range: (f64, f64), most: usize) -> (Vec<f64>, usize) {
     let rough = (range.1 - range.0) / most.max(1) as f64;
     if !(rough.is_finite() && rough > 0.0) {
         return (Vec::new(), 0);
@@ -76,23 +78,6 @@ pub fn ticks(range: (f64, f64), most: usize) -> (Vec<f64>, usize) {
     let last = (range.1 / step + 1e-9).floor() as i64;
     let decimals = (-(step * 1.000_001).log10().floor()).max(0.0) as usize;
     ((first..=last).map(|n| n as f64 * step).collect(), decimals)
-}
-
-/// Text of axes, CSS pixels.
-pub const TEXT_PX: f64 = 12.0;
-
-/// Lines at the ticks and none between them, and the text of a plot. A plot may override them
-/// afterwards.
-pub fn plain<'m, 'a, 'b, X: Ranged, Y: Ranged, DB: DrawingBackend>(
-    mesh: &'m mut MeshStyle<'a, 'b, X, Y, DB>,
-) -> &'m mut MeshStyle<'a, 'b, X, Y, DB> {
-    let text = || ("sans-serif", size(TEXT_PX), &palette::TEXT);
-    mesh.light_line_style(TRANSPARENT)
-        .bold_line_style(palette::GRID.stroke_width(2))
-        .axis_style(palette::AXIS.stroke_width(2))
-        .x_label_style(text())
-        .y_label_style(text())
-        .axis_desc_style(text())
 }
 
 #[cfg(test)]
@@ -110,6 +95,15 @@ mod tests {
             ticks((0.0, 0.25), 5),
             (vec![0.0, 0.05, 0.1, 0.15000000000000002, 0.2, 0.25], 2)
         );
+    }
+
+    #[test]
+    fn a_logarithmic_axis_is_labelled_by_its_quantity() {
+        let labels = |range| -> Vec<String> {
+            Scale::Log.ticks(range, 1).into_iter().map(|tick| tick.1).collect()
+        };
+        assert_eq!(labels((-1.1, 0.4)), ["0.1", "0.2", "0.5", "1", "2"]);
+        assert_eq!(labels((-4.0, 0.0)), ["1e-4", "0.001", "0.01", "0.1", "1"]);
     }
 
     #[test]

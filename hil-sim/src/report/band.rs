@@ -1,7 +1,8 @@
 //! Mode, contact stage and sleeve level as three bands on the axis of the plots.
 
-use super::palette;
-use super::panel::{Panel, Stretch};
+use super::axis::Scale;
+use super::palette::{self, Colour};
+use super::panel::{HeatCell, Panel};
 use super::panels::View;
 use crate::record::{MODE_NAMES, Tick};
 
@@ -20,7 +21,7 @@ struct Lane {
     name: &'static str,
     of: fn(&Tick) -> u8,
     show: fn(u8) -> String,
-    colours: &'static [u32],
+    colours: &'static [Colour],
 }
 
 const LANES: [Lane; 3] = [
@@ -46,19 +47,27 @@ fn stage(number: u8) -> String {
 
 /// The three bands of `view`.
 pub(super) fn panel(view: &View) -> Panel {
-    let band = |lane: &Lane| {
-        let stretch = |(from, to, value): (f64, f64, u8)| {
-            let colour = palette::rgb(lane.colours[usize::from(value) % lane.colours.len()]);
-            Stretch { from, to, name: (lane.show)(value), colour }
+    // What is too short to be seen has no place in the legend either.
+    let least = 1e-3 * (view.x.1 - view.x.0);
+    let cells = LANES.iter().enumerate().flat_map(|(place, lane)| {
+        let low = -0.92 - place as f64;
+        let cell = move |(from, to, value): (f64, f64, u8)| {
+            let colour = lane.colours[usize::from(value) % lane.colours.len()];
+            let (name, text) = ((lane.show)(value), String::new());
+            HeatCell { x: (from, to), y: (low, low + 0.84), colour, name, text }
         };
-        // What is too short to be seen has no place in the legend either.
-        let least = 1e-3 * (view.x.1 - view.x.0);
-        let seen = |one: &Stretch| one.to.min(view.x.1) - one.from.max(view.x.0) > least;
-        (lane.name, spans(view, lane.of).into_iter().map(stretch).filter(seen).collect())
-    };
-    let (shades, rules) = Default::default();
-    let bands = LANES.iter().map(band).collect();
-    Panel { shades, rules, bands, ..view.panel("Mode, contact stage and sleeve level", "") }
+        spans(view, lane.of).into_iter().map(cell)
+    });
+    let cells = cells.filter(|one| one.x.1.min(view.x.1) - one.x.0.max(view.x.0) > least).collect();
+    let names = LANES.iter().enumerate().map(|(n, lane)| (-0.5 - n as f64, lane.name.to_owned()));
+    Panel {
+        y: Some((-(LANES.len() as f64), 0.0)),
+        y_axis: Scale::Named(names.collect()),
+        cells,
+        shades: Vec::new(),
+        rules: Vec::new(),
+        ..view.panel("Mode, contact stage and sleeve level", "")
+    }
 }
 
 /// Spans of the axis over which `of` stays the same.
@@ -89,8 +98,9 @@ mod tests {
             spans(&view, |row| row.controller.mode),
             [(0.0, 2.0, 5), (2.0, 3.0, 6), (3.0, 3.002, 7)]
         );
-        let modes = panel(&view).bands.swap_remove(0).1;
-        let names: Vec<&str> = modes.iter().map(|one| one.name.as_str()).collect();
+        let cells = panel(&view).cells;
+        let modes = cells.iter().filter(|cell| cell.y.1 > -1.0);
+        let names: Vec<&str> = modes.map(|one| one.name.as_str()).collect();
         assert_eq!(names, ["cruise", "approach"]);
     }
 

@@ -2,15 +2,14 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use plotters::style::RGBColor;
-
 use super::page::{SIZE, end, folded, head, section};
-use super::panel::{Line, Look, Marks, Panel, Shape, stacked};
+use super::palette::{self, Colour};
+use super::panel::{Line, Look, Marks, Panel, Shape, sheet};
 use super::panels::{Across, View, figure};
 use super::svg::escape;
 use super::tables::{COLUMNS, Column};
 use super::verdict::{Grade, gap_sentence, headline, origin, verdict};
-use super::{axis, palette, tables};
+use super::{axis, tables};
 use crate::record::{CrossingLine, Recording, Tick};
 use crate::scenario::{brief, leaves};
 use crate::table::number;
@@ -132,10 +131,8 @@ pub fn table(differences: &[Difference]) -> (Vec<String>, Vec<Vec<String>>) {
     (head, rows.collect())
 }
 
-/// Size of the picture, CSS pixels: its text can still be read at 400.
-const PICTURE: (u32, u32) = (700, 1000);
 /// Colours of up to three, widths of their lines, CSS pixels, and marks: all are seen at one place.
-const LOOKS: [(RGBColor, f64, Shape); 3] = [
+const LOOKS: [(Colour, f64, Shape); 3] = [
     (palette::PRELOAD, 4.5, Shape::Ring),
     (palette::SPEED, 2.5, Shape::Square),
     (palette::GAP, 1.2, Shape::Dot),
@@ -145,7 +142,7 @@ const LOOKS: [(RGBColor, f64, Shape); 3] = [
 pub fn beside_svg(runs: &[(String, &Recording)]) -> String {
     let own: Vec<_> = runs.iter().map(|(name, run)| (&**name, run.since_command())).collect();
     let own: Vec<_> = own.iter().map(|(name, run)| (*name, run)).collect();
-    stacked(PICTURE, &mut panels(&own))
+    sheet(panels(&own), 1, true)
 }
 
 /// Gap, preload, speed, position and slip of runs with their names, each since its command.
@@ -193,7 +190,7 @@ fn panels(runs: &[(&str, &Recording)]) -> Vec<Panel> {
 /// The gap of every crossing, beside the reference of its own run: in mm if a run has none.
 fn own_gaps(views: &[View<'_>], runs: &[(&str, &Recording)], mut panel: Panel) -> Panel {
     let is_relative = panel.also.take().is_some();
-    panel.y_name = if is_relative { "gap, % of reference" } else { "gap, mm" };
+    panel.y_name = if is_relative { "gap, % of reference" } else { "gap, mm" }.to_owned();
     panel.title = "Gap at the steps".to_owned();
     let all = views.iter().zip(runs).zip(LOOKS);
     panel.marks = all
@@ -205,7 +202,7 @@ fn own_gaps(views: &[View<'_>], runs: &[(&str, &Recording)], mut panel: Panel) -
                 Some((line.lift_s, gap.or(line.gap_measured_mm)? / one))
             };
             let points = summary.crossings.iter().filter_map(own).collect();
-            Marks { name: (*name).to_owned().into(), shape, colour, points }
+            Marks { name: (*name).to_owned(), shape, colour, points }
         })
         .collect();
     (panel.lines, panel.shades, panel.rules) = Default::default();
@@ -263,8 +260,8 @@ mod tests {
         let svg =
             beside_svg(&names.map(str::to_owned).into_iter().zip([&a, &b, &b]).collect::<Vec<_>>());
         for name in names {
-            // A line in four plots; the marks, some with rims, in one; five legends.
-            assert!([10, 11].contains(&svg.matches(name).count()), "{name}");
+            // A line in four plots; the marks, some with rims, in one; one legend.
+            assert!([6, 7].contains(&svg.matches(name).count()), "{name}");
         }
         assert!(svg.contains("reference gap") && !svg.contains("NaN"));
         // Each gap is a part of its own run's reference.

@@ -1,19 +1,12 @@
 //! The plots of a run, over time or over position.
 
-use std::borrow::Cow;
-
-use plotters::style::RGBColor;
-
 use super::axis;
-use super::palette;
+use super::palette::{self, Colour};
 use super::panel::Look::{Limit, Measured, Truth, Wanted};
-use super::panel::{Line, Look, Marks, Panel, Rule, Shape, stacked};
+use super::panel::{Line, Look, Marks, Panel, Rule, Shape, sheet};
 use super::verdict::GAP_TOLERANCE;
 use crate::record::{Column, Controller, CrossingLine, Recording, Report, Tick, TrueState};
 use crate::scenario::Scenario;
-
-/// Size of the overview, CSS pixels.
-const OVERVIEW: (u32, u32) = (1000, 820);
 
 /// What the horizontal axis shows.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -112,11 +105,11 @@ impl<'a> View<'a> {
     }
 
     /// An empty plot.
-    pub(super) fn panel(&self, title: &str, y_name: &'static str) -> Panel {
+    pub(super) fn panel(&self, title: &str, y_name: &str) -> Panel {
         Panel {
             title: title.to_owned(),
-            y_name,
-            x_name: Some(self.across.name()),
+            y_name: y_name.to_owned(),
+            x_name: self.across.name().to_owned(),
             x: self.x,
             shades: self.shades.clone(),
             rules: self.rules.clone(),
@@ -127,7 +120,7 @@ impl<'a> View<'a> {
     /// A line of one field.
     pub(super) fn line(
         &self,
-        name: impl Into<Cow<'static, str>>,
+        name: impl Into<String>,
         look: Look,
         of: impl Fn(&Tick) -> f64,
     ) -> Line {
@@ -157,7 +150,7 @@ impl<'a> View<'a> {
     fn marks(
         &self,
         name: &'static str,
-        (shape, colour): (Shape, RGBColor),
+        (shape, colour): (Shape, Colour),
         of: impl Fn(&CrossingLine) -> Option<f64>,
     ) -> Marks {
         let crossings = &self.recording.summary.crossings;
@@ -239,8 +232,7 @@ impl<'a> View<'a> {
         panel.least_span = 0.2;
         panel.lines = self.curves("slip margin", palette::SLIP, |t| t.slip_margin_true);
         panel.levels = vec![("slip", Limit, 0.0)];
-        let (low, high) = panel.y_range();
-        panel.y = Some((low.min(-0.1), high));
+        panel.reach = vec![-0.1];
         panel
     }
 
@@ -292,12 +284,11 @@ fn reports(recording: &Recording, across: Across) -> Vec<Rule> {
     rules
 }
 
-/// Speed, preload, gap and radius of a run over time from the command on, stacked, as an SVG of
-/// 1000 x 820.
+/// Speed, preload, gap and radius of a run over time from the command on, as an SVG.
 pub fn overview_svg(recording: &Recording) -> String {
     let recording = &recording.since_command();
     let view = View::new(recording, Across::Time);
-    stacked(OVERVIEW, &mut [view.speed(), view.preload(), view.gap(), view.radius()])
+    sheet(vec![view.speed(), view.preload(), view.gap(), view.radius()], 1, false)
 }
 
 /// A plot, with what the script needs to place its cursor: axis, and time at its zero.

@@ -114,7 +114,7 @@ const plots = (() => {
       svg.querySelector(".axis").setAttribute("d", `M${left} ${top}V${bottom}H${end}`);
       const name = svg.querySelector(".across");
       if (name) name.setAttribute("x", (left + end) / 2);
-      const axes = ticks(...x, Math.max(2, width / 75)).flatMap(([value, text]) => [
+      const axes = ticks(...x, Math.min(10, Math.max(2, (end - left) / 45))).flatMap(([value, text]) => [
         element("path", { class: "grid", d: `M${pixel(value)} ${top}V${bottom}` }),
         element("text", { x: pixel(value), y: bottom + 16, "text-anchor": "middle" }, name ? text : ""),
       ]);
@@ -127,7 +127,7 @@ const plots = (() => {
       const labels = svg.querySelector(".labels"), taken = [];
       // A text at the first of these places where there is room; a fault's without room at the last.
       const add = (text, places, more, low, high, isFault) => {
-        const label = element("text", { ...more, "font-size": 11 }, text);
+        const label = element("text", more, text);
         labels.append(label);
         for (const [x, anchor] of places) {
           label.setAttribute("x", x);

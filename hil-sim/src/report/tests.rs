@@ -84,7 +84,7 @@ fn faults_limits_and_steps_are_marked_and_other_parameters_listed() {
     let is_marked = |page: &str, mark: &str| page.contains(&format!(">{mark}</text>"));
     assert!(is_marked(&page, "201") && !page.contains(">touch</text>"));
     // At the right edge a name is to the left of its line.
-    assert!(page.contains("text-anchor=\"end\" font-size=\"11\" fill=\"#b91c1c\">121</text>"));
+    assert!(page.contains("text-anchor=\"end\" fill=\"#b91c1c\">121</text>"));
     assert!(is_marked(&html(&example::deploy(), &[]), "step 1"));
     let mut together = recording.clone();
     let first = together.summary.limits[0].clone();
@@ -100,7 +100,7 @@ fn axes_have_units_time_begins_at_the_command_and_the_measured_is_over_the_truth
     let view = View::new(&recording, Across::Time);
     assert!(recording.rows[0].controller.t_s < -0.1);
     assert_eq!(view.x.0, 0.0);
-    for panel in view.all().iter().filter(|panel| panel.bands.is_empty()) {
+    for panel in view.all().iter().filter(|panel| panel.cells.is_empty()) {
         assert!(panel.y_name.contains(", "), "{}: {}", panel.title, panel.y_name);
     }
     let svg = view.preload().figure("", (1100, 240), "");

@@ -6,21 +6,8 @@ use serde_json::{Map, Value};
 use super::Axis;
 use crate::report::axis;
 use crate::report::palette;
-use crate::report::panel::{Line, Look, Marks, Panel, Shape, stacked};
+use crate::report::panel::{Line, Look, Panel, sheet};
 use crate::scenario::brief;
-
-/// Size of a plot, CSS pixels.
-const SIZE: (u32, u32) = (1000, 280);
-
-/// Colours of the lines, in their order.
-const COLOURS: [plotters::style::RGBColor; 6] = [
-    palette::SPEED,
-    palette::PRELOAD,
-    palette::GAP,
-    palette::SLIP,
-    palette::COMPRESSION,
-    palette::RADIUS,
-];
 
 /// A figure of the rows that is plotted.
 #[derive(Clone, Copy, Debug)]
@@ -51,15 +38,6 @@ pub fn picture(axes: &[Axis], rows: &[Map<String, Value>], plots: &[Plot]) -> Op
         if is_none { f64::NAN } else { number(row, key) }
     };
     let range = axis::padded(axis::extent(rows.iter().map(|row| number(row, &x.key)))?, 0.02);
-    let size = (SIZE.0, SIZE.1 * plots.len() as u32);
-    // The text lives as long as the process, which ends after the picture.
-    let x_name: &'static str = x.key.clone().leak();
-    let dots = |Line { name, look, points }: &Line| Marks {
-        name: name.clone(),
-        shape: Shape::Dot,
-        colour: look.colour(),
-        points: points.clone(),
-    };
     let panel = |plot: &Plot| {
         let line = |(place, name): (usize, &String)| {
             let own = rows.iter().filter(|row| group(row) == *name);
@@ -67,22 +45,22 @@ pub fn picture(axes: &[Axis], rows: &[Map<String, Value>], plots: &[Plot]) -> Op
                 own.map(|row| (number(row, &x.key), figure(row, plot.column))).collect();
             points.sort_by(|a, b| a.0.total_cmp(&b.0));
             let name = if name.is_empty() { plot.title } else { name };
-            let look = Look::Other(COLOURS[place % COLOURS.len()], 2.0);
-            Line { name: name.to_owned().into(), look, points }
+            let look = Look::Other(palette::SERIES[1..][place % 6], 2.0);
+            Line { name: name.to_owned(), look, points }
         };
         let lines: Vec<Line> = names.iter().enumerate().map(line).collect();
         Panel {
             title: plot.title.to_owned(),
-            y_name: plot.y_name,
-            x_name: Some(x_name),
+            y_name: plot.y_name.to_owned(),
+            x_name: x.key.clone(),
             x: range,
             // A value between two failed runs has no line.
-            marks: lines.iter().map(dots).collect(),
+            marks: lines.iter().map(Line::dots).collect(),
             lines,
             ..Panel::default()
         }
     };
-    Some(stacked(size, &mut plots.iter().map(panel).collect::<Vec<_>>()))
+    Some(sheet(plots.iter().map(panel).collect(), 1, names.len() > 1))
 }
 
 #[cfg(test)]

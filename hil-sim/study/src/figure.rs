@@ -83,9 +83,9 @@ impl Series {
     }
 }
 
-/// One plot.
+/// One plot as data.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Panel {
+pub struct Chart {
     pub title: String,
     /// Name and unit of the horizontal axis.
     pub x: String,
@@ -102,7 +102,7 @@ pub struct Panel {
     pub series: Vec<Series>,
 }
 
-impl Panel {
+impl Chart {
     /// A plot with these names and units of its axes.
     pub fn new(title: impl Into<String>, x: &str, y: &str, series: Vec<Series>) -> Self {
         let (title, x, y) = (title.into(), x.into(), y.into());
@@ -185,7 +185,7 @@ pub struct Figure {
     /// Plots in a row.
     pub columns: usize,
     /// The plots, row by row.
-    pub panels: Vec<Panel>,
+    pub panels: Vec<Chart>,
     /// Published numbers beside ours.
     pub published: Vec<Mark>,
 }
@@ -197,7 +197,7 @@ impl Figure {
         title: &'static str,
         caption: String,
         columns: usize,
-        panels: Vec<Panel>,
+        panels: Vec<Chart>,
     ) -> Self {
         let (file, published) = (format!("{id}.svg"), Vec::new());
         Self { id, file, title, caption, columns, panels, published }

@@ -6,7 +6,7 @@ use interstage::rig::Rig;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use crate::figure::{Figure, Panel, Series, Source};
+use crate::figure::{Chart, Figure, Series, Source};
 use crate::paper::published::{AMPLITUDE_MM, CASES, COLLISION_N, STRESS};
 use crate::reference::rubber::{Rubber, THICKNESS_MM};
 use crate::reference::vibration::{Arm, CONSTRAINED_HZ, FREE_HZ, bending};
@@ -176,8 +176,8 @@ pub fn figure() -> Result<Figure> {
     forces.push(Series::new(Source::Published, marks(COLLISION_N)));
     let (gap, force) = ("Gap: the tread is fitted to these marks", "Collision force: not fitted");
     let panels = vec![
-        Panel::new(gap, "preload, N", "gap, mm", gaps),
-        Panel::new(force, "preload, N", "force, N", forces),
+        Chart::new(gap, "preload, N", "gap, mm", gaps),
+        Chart::new(force, "preload, N", "force, N", forces),
     ];
     Ok(Figure::new("model", "Gap and collision force over preload", String::new(), 2, panels))
 }

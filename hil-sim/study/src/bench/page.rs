@@ -8,7 +8,7 @@ use hil_sim::table::{number, plain};
 
 use super::Report;
 use super::peers::{LEVEL, Peers, RING};
-use crate::figure::{Figure, Panel, Series};
+use crate::figure::{Chart, Figure, Series};
 use crate::figure_svg::svg;
 
 /// The pages in the folder `docs` with these tables, and the plots: names below it, and texts.
@@ -36,11 +36,11 @@ fn filled(page: &str, name: &str, table: &str) -> io::Result<String> {
     parts.ok_or_else(|| io::Error::other(format!("no place for the table `{name}` in its page")))
 }
 
-fn figure(id: &'static str, columns: usize, panels: Vec<Panel>) -> Figure {
+fn figure(id: &'static str, columns: usize, panels: Vec<Chart>) -> Figure {
     Figure::new(id, "", String::new(), columns, panels)
 }
 
-fn plant_panel(report: &Report) -> Panel {
+fn plant_panel(report: &Report) -> Chart {
     // At the default's ratio of elements and stride.
     let usual = report.plant.default;
     let product = usual.elements as f64 * usual.stride_mm;
@@ -51,14 +51,14 @@ fn plant_panel(report: &Report) -> Panel {
         line.map(|point| (1e-6 * point.wall_ns, error(point))).collect()
     };
     let series = vec![
-        Series::method(3, "gap", of(|point| point.gap_error)),
-        Series::method(4, "force", of(|point| point.force_error)),
+        Series::method(4, "gap", of(|point| point.gap_error)),
+        Series::method(0, "force", of(|point| point.force_error)),
     ];
     let (title, x) = ("Plant: worst of twelve crossings", "time of a crossing, ms");
-    Panel::new(title, x, "relative error", series).logarithmic()
+    Chart::new(title, x, "relative error", series).logarithmic()
 }
 
-fn peers_panel(peers: &Peers) -> Panel {
+fn peers_panel(peers: &Peers) -> Chart {
     let series = peers.least_seconds.iter().enumerate().map(|(index, (name, _))| {
         let of = peers.settings.iter().filter(|setting| setting.name == *name);
         let mut points: Vec<(f64, f64)> =
@@ -74,7 +74,7 @@ fn peers_panel(peers: &Peers) -> Panel {
         Series::method(index, name, points)
     });
     let (title, y) = ("One crossing (5 mm/s, 100 N)", "relative error of gap or force");
-    Panel::new(title, "time, ms", y, series.collect()).logarithmic()
+    Chart::new(title, "time, ms", y, series.collect()).logarithmic()
 }
 
 /// The tables of a measurement.

@@ -12,7 +12,7 @@ use super::published::{AMPLITUDE_MM, CASES, COLLISION_N, STRESS};
 use super::simulation;
 use super::theory::{self, Drive, Lift};
 use super::transitions::at;
-use crate::figure::{Claim, Figure, Mark, Panel, SOURCES, Series, Source};
+use crate::figure::{Chart, Claim, Figure, Mark, SOURCES, Series, Source};
 use crate::reference::{ReferenceCase, Rubber};
 
 const SECTION: &str = "Simulation analysis results";
@@ -334,9 +334,9 @@ fn beside(marks: &mut [Mark], pick: impl Fn(Crossing) -> f64) {
     }
 }
 
-fn categories(title: &str, y: &str, series: impl Iterator<Item = Series>) -> Panel {
+fn categories(title: &str, y: &str, series: impl Iterator<Item = Series>) -> Chart {
     let names = CASES[..3].iter().map(|(v, p)| format!("{v}, {p} N")).collect();
-    Panel::of_categories(title, ("speed in mm/s, preload", names), y, series.collect())
+    Chart::of_categories(title, ("speed in mm/s, preload", names), y, series.collect())
 }
 
 fn numbered(values: [f64; 3]) -> Vec<(f64, f64)> {

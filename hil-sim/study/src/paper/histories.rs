@@ -6,7 +6,7 @@ use super::case::{Arms, Case};
 use super::experiment::{Experiment, STAGES, groups};
 use super::published::LOG_S;
 use super::{simulation, theory};
-use crate::figure::{Panel, SOURCES, Series, Source};
+use crate::figure::{Chart, SOURCES, Series, Source};
 
 /// One of this many points of theory and simulation is shown.
 const SHOWN_OF: usize = 8;
@@ -129,13 +129,13 @@ impl Histories {
             / most(f64::NEG_INFINITY, f64::INFINITY)
     }
 
-    pub fn panel(&self, quantity: Quantity) -> Panel {
+    pub fn panel(&self, quantity: Quantity) -> Chart {
         let title = format!("{} {}", ["(a)", "(b)", "(c)"][quantity as usize], self.case.name());
         let means = self.means.iter().map(|mean| quantity.of(mean).clone());
         let theory = Series::new(Source::Theory, thin(quantity.of(&self.theory)));
         let simulation = Series::new(Source::Simulation, thin(quantity.of(&self.simulation)));
         let series = [theory, simulation].into_iter().chain(Series::means(means)).collect();
-        Panel::new(title, "time, s", quantity.axis(), series)
+        Chart::new(title, "time, s", quantity.axis(), series)
     }
 
     /// Clearance from the root of the first step until the centre passes it, theory and
@@ -145,7 +145,7 @@ impl Histories {
     }
 
     /// The clearance at the first step as a plot.
-    pub fn clearance_panel(&self) -> Panel {
+    pub fn clearance_panel(&self) -> Chart {
         let title = format!("Clearance (Fig. 16): {}", self.case.name());
         let [theory, simulation] =
             self.clearance().map(|points| points.into_iter().step_by(SHOWN_OF).collect());
@@ -153,12 +153,12 @@ impl Histories {
         let series = [(Source::Theory, theory), (Source::Simulation, simulation)]
             .map(|(source, points)| Series::new(source, points));
         let series = series.into_iter().chain(Series::means(means)).collect();
-        Panel::new(title, "time, s", "root clearance, mm", series)
+        Chart::new(title, "time, s", "root clearance, mm", series)
     }
 }
 
 /// All quantities of all cases as plots.
-pub fn panels(all: &[Histories]) -> Vec<Panel> {
+pub fn panels(all: &[Histories]) -> Vec<Chart> {
     let row = |quantity| all.iter().map(move |one| one.panel(quantity));
     Quantity::ALL.into_iter().flat_map(row).collect()
 }

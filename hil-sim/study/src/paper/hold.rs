@@ -11,7 +11,7 @@ use super::published::{CONSTRAINED_HZ, FREE_HZ, LEAST_PRELOAD_N, LEAST_SPEED_MM_
 use super::simulation;
 use super::sweeps::Sweep;
 use super::theory::{self, Drive};
-use crate::figure::{Claim, Figure, Panel, Series, Source};
+use crate::figure::{Chart, Claim, Figure, Series, Source};
 use crate::reference::beam::BeamError;
 use crate::reference::vibration::Arm;
 use hil_sim::plant::balance::{Axial, BalanceError};
@@ -115,8 +115,8 @@ impl Hold {
         let title = "Preload that holds the gap of 5 mm/s, 33.3 N";
         let cases = ("speed in mm/s, preload", CASES.map(|(v, p)| format!("{v}, {p} N")).to_vec());
         let panels = vec![
-            Panel::new(title, "speed, mm/s", "preload, N", preload),
-            Panel::of_categories("Gap without and with more preload", cases, "gap, mm", gap),
+            Chart::new(title, "speed, mm/s", "preload, N", preload),
+            Chart::of_categories("Gap without and with more preload", cases, "gap, mm", gap),
         ];
         let caption = "The study's conclusion, at rig loads: the preload with which a faster wheel \
                        keeps the gap of 5 mm/s and 33.3 N. Theory: the tread rolled out in \

@@ -1,7 +1,7 @@
 //! Figure 19: modes of the drive arm.
 
 use super::published::{CONSTRAINED_HZ, FREE_HZ};
-use crate::figure::{Claim, Figure, Mark, Panel, Series, Source};
+use crate::figure::{Chart, Claim, Figure, Mark, Series, Source};
 use crate::reference::beam::{Beam, BeamError, Ends, Shape, Tip};
 
 const SECTION: &str = "Experiment scheme";
@@ -70,7 +70,7 @@ impl Modes {
         ];
         let names = vec!["first constrained".into(), "seventh free".into()];
         let mut hertz =
-            Panel::of_categories("Natural frequency", ("mode", names), "frequency, Hz", series);
+            Chart::of_categories("Natural frequency", ("mode", names), "frequency, Hz", series);
         hertz.least_y = Some((0.0, 0.0));
         let classical = [
             ("First constrained mode", clamped as Classical, self.constrained[0].0),
@@ -85,7 +85,7 @@ impl Modes {
                 Series::new(Source::Simulation, simulation),
             ];
             let (x, y) = ("along the arm, mm", "deflection over largest");
-            panels.push(Panel::new(title, x, y, series));
+            panels.push(Chart::new(title, x, y, series));
         }
         let mark = |what: &str, published, of: [(f64, f64); 2]| {
             let ours = [(Source::Theory, of[0].1), (Source::Simulation, of[1].1)];

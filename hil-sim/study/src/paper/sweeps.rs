@@ -10,7 +10,7 @@ use super::means::{Means, bend};
 use super::published::{AREA_SPREAD_MM2, DEPTH_SPREAD_MM, GAP_SPREAD_MM};
 use super::simulation;
 use super::theory::{self, Drive, Lift};
-use crate::figure::{Claim, Figure, Mark, Panel, Series, Source};
+use crate::figure::{Chart, Claim, Figure, Mark, Series, Source};
 
 /// Preloads of the sweep, N: from the least to the most that the study names for its
 /// rig.
@@ -170,7 +170,7 @@ impl Sweep {
         &self,
         id: &'static str,
         title: &'static str,
-        panels: Vec<Panel>,
+        panels: Vec<Chart>,
         published: Vec<Mark>,
     ) -> Figure {
         let fixed = self.variable.fixed();
@@ -190,7 +190,7 @@ impl Sweep {
         Figure { published, ..Figure::new(id, title, caption, 2, panels) }
     }
 
-    fn panel(&self, title: &str, y: &str, curves: &Curves) -> Panel {
+    fn panel(&self, title: &str, y: &str, curves: &Curves) -> Chart {
         let pairs =
             |values: &[f64]| curves.at.iter().copied().zip(values.iter().copied()).collect();
         let mut series = vec![
@@ -199,12 +199,12 @@ impl Sweep {
         ];
         series.extend(curves.experiment.series());
         let title = format!("{title}, {}", self.variable.fixed());
-        Panel::new(title, self.variable.axis(), y, series)
+        Chart::new(title, self.variable.axis(), y, series)
     }
 
     /// The means alone, about their middle, between two marks that are as far apart as the
     /// published means are at most.
-    fn differences(&self, what: &str, unit: &str, published: f64, curves: &Curves) -> Panel {
+    fn differences(&self, what: &str, unit: &str, published: f64, curves: &Curves) -> Chart {
         let middle = curves.experiment.middle();
         let mut all = curves.experiment.series();
         for series in &mut all {
@@ -215,7 +215,7 @@ impl Sweep {
         let half = 0.5 * published;
         all.push(Series::new(Source::Published, vec![(x, -half), (x, half)]));
         let title = format!("Differences between the means of the {what}");
-        Panel::new(title, self.variable.axis(), &format!("off the mean, {unit}"), all)
+        Chart::new(title, self.variable.axis(), &format!("off the mean, {unit}"), all)
     }
 }
 
