@@ -233,31 +233,8 @@ impl Claim {
         }
     }
 
-    /// A claim of `figure`, made in `section`, not yet judged.
-    pub fn of(figure: &'static str, section: &'static str, id: &'static str) -> Self {
-        let (claim, why) = ("".into(), String::new());
-        Self { id, figure, section, claim, holds: false, fitted: false, why }
-    }
-
     /// The same, with a parameter of ours fitted to it.
     pub fn fitted(self) -> Self {
         Self { fitted: true, ..self }
-    }
-
-    /// What the claim says, whether it holds, and what was found.
-    pub fn judged(self, claim: impl Into<Cow<'static, str>>, holds: bool, why: String) -> Self {
-        Self { claim: claim.into(), holds, why, ..self }
-    }
-
-    /// The same with the reason if it does not hold; empty for none.
-    pub fn explained(
-        self,
-        claim: impl Into<Cow<'static, str>>,
-        holds: bool,
-        found: String,
-        reason: &str,
-    ) -> Self {
-        let why = if holds || reason.is_empty() { found } else { format!("{found} {reason}") };
-        self.judged(claim, holds, why)
     }
 }

@@ -10,6 +10,7 @@
 pub mod amplitudes;
 pub mod case;
 pub mod cases;
+pub mod claims;
 pub mod experiment;
 mod finite_elements;
 pub mod histories;
@@ -25,13 +26,13 @@ pub mod theory;
 pub mod transitions;
 
 use anyhow::Result;
-use interstage::rig::Rig;
 use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::figure::{Claim, Figure};
 use amplitudes::Amplitudes;
 use case::Case;
+use claims::Data;
 use experiment::Experiment;
 use histories::Histories;
 use hold::Hold;
@@ -53,12 +54,12 @@ pub fn runs() -> usize {
 
 /// Cases of all experiments, each once.
 fn cases() -> Vec<Case> {
-    let all = [
-        cases::cases(),
-        Variable::Preload.cases(),
-        Variable::Speed.cases(),
-        transitions::cases(),
-        Hold::cases(),
+    let all: [&[Case]; 5] = [
+        &cases::cases(),
+        &Variable::Preload.cases(),
+        &Variable::Speed.cases(),
+        &transitions::cases(),
+        &Hold::cases(),
     ];
     let mut unique: Vec<Case> = Vec::new();
     for case in all.concat() {
@@ -77,41 +78,39 @@ pub fn regenerate(done: &(dyn Fn() + Sync)) -> Result<Study> {
         let of = |case: &Case| experiments.iter().find(|e| e.case == *case);
         wanted.iter().filter_map(of).collect()
     };
-    let histories = |wanted: &[Case]| {
-        find(wanted).into_par_iter().map(Histories::new).collect::<Result<Vec<_>>>()
+    let deployments = [cases::cases(), transitions::cases()].concat();
+    let deployments = find(&deployments).into_par_iter().map(Histories::new);
+    let data = Data {
+        histories: deployments.collect::<Result<_>>()?,
+        amplitudes: Amplitudes::new(&find(&cases::cases()))?,
+        modes: Modes::new()?,
+        preload: Sweep::new(Variable::Preload, &find(&Variable::Preload.cases()))?,
+        speed: Sweep::new(Variable::Speed, &find(&Variable::Speed.cases()))?,
+        hold: Hold::new(&find(&Hold::cases()))?,
+        experiments,
     };
-    let four = histories(&cases::cases())?;
-    let three = histories(&transitions::cases())?;
-    let amplitudes = Amplitudes::new(&find(&cases::cases()))?;
-    let modes = Modes::new()?;
-    let preload = Sweep::new(Variable::Preload, &find(&Variable::Preload.cases()))?;
-    let speed = Sweep::new(Variable::Speed, &find(&Variable::Speed.cases()))?;
-    let hold = Hold::new(&find(&Hold::cases()))?;
-    let at_rig: Vec<&Experiment> =
-        experiments.iter().filter(|e| e.case.loads == case::Loads::Prototype).collect();
-    let pitch = Rig::prototype().drive.ripple_pitch_mm;
+    let (at_study, at_rig) = data.histories.split_at(cases::cases().len());
     let figures = vec![
-        cases::figure(&four),
-        amplitudes.loads_figure(),
-        amplitudes.gap_figure(&four),
-        modes.figure(),
-        preload.gap_figure(),
-        speed.gap_figure(),
-        preload.depth_figure(),
-        speed.depth_figure(),
-        transitions::figure(&three),
-        hold.figure(),
+        cases::figure(at_study),
+        data.amplitudes.loads_figure(),
+        data.amplitudes.gap_figure(at_study),
+        data.modes.figure(),
+        data.preload.gap_figure(),
+        data.speed.gap_figure(),
+        data.preload.depth_figure(),
+        data.speed.depth_figure(),
+        transitions::figure(at_rig),
+        data.hold.figure(),
     ];
     let claims = [
-        cases::claims(&four),
-        amplitudes.claims(&four),
-        modes.claims((3.0 / pitch, 8.0 / pitch)),
-        sweeps::preload_claims(&preload),
-        sweeps::speed_claims(&speed, &preload),
-        transitions::claims(&three),
-        hold.claims(&at_rig, &speed),
-    ]
-    .concat();
+        cases::claims(&data),
+        amplitudes::claims(&data),
+        modes::claims(&data.modes),
+        sweeps::claims(&data),
+        transitions::claims(&data),
+        hold::claims(&data),
+    ];
+    let claims = claims.concat();
     Ok(Study { figures, claims })
 }
 

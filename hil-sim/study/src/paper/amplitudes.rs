@@ -4,10 +4,13 @@
 use anyhow::Result;
 
 use super::case::Case;
+use super::cases::cases;
+use super::claims::{
+    BySource, Column, Data, FALLS, RISES, change, largest, percents, row, table, within,
+};
 use super::experiment::{Experiment, Run, marks as mark_runs};
 use super::finite_elements::{self, Crossing};
-use super::histories::{Histories, stage_ends_mm};
-use super::histories::{Points, Quantity};
+use super::histories::{Histories, Points, Quantity, stage_ends_mm};
 use super::published::{AMPLITUDE_MM, CASES, COLLISION_N, STRESS};
 use super::simulation;
 use super::theory::{self, Drive, Lift};
@@ -15,7 +18,8 @@ use super::transitions::at;
 use crate::figure::{Chart, Claim, Figure, Mark, SOURCES, Series, Source};
 use crate::reference::{ReferenceCase, Rubber};
 
-const SECTION: &str = "Simulation analysis results";
+const SIMULATED: &str = "Simulation analysis results";
+const TRANSMITTED: &str = "Vibration transmission model";
 
 /// Largest deviation of one curve from another that closely resembles it, relative.
 const CLOSE: f64 = 0.03;
@@ -26,6 +30,7 @@ const MINIMAL: f64 = 0.03;
 /// One case from all sources, in the first transition.
 #[derive(Clone, Debug)]
 struct Three {
+    case: Case,
     theory: Lift,
     simulation: Lift,
     /// All runs.
@@ -57,11 +62,12 @@ impl Amplitudes {
     /// first transition of the experiments, in the order of the study's cases.
     pub fn new(experiments: &[&Experiment]) -> Result<Self> {
         let of = |experiment: &&Experiment| {
-            let case = &experiment.case;
+            let case = experiment.case;
             Ok(Three {
-                theory: theory::lift(case, Drive::Pushed, 0)?,
-                simulation: simulation::lift(case, Drive::Pushed, 0)?,
-                experiment: experiment.runs.iter().filter_map(|run| first(case, run)).collect(),
+                case,
+                theory: theory::lift(&case, Drive::Pushed, 0)?,
+                simulation: simulation::lift(&case, Drive::Pushed, 0)?,
+                experiment: experiment.runs.iter().filter_map(|run| first(&case, run)).collect(),
             })
         };
         let cases = experiments[..3].iter().map(of).collect::<Result<_>>()?;
@@ -72,6 +78,12 @@ impl Amplitudes {
 
     fn values(&self, source: Source, pick: impl Fn(&Lift) -> f64) -> [f64; 3] {
         std::array::from_fn(|index| self.cases[index].value(source, &pick))
+    }
+
+    /// A figure of one of the cases from each source.
+    pub fn lift(&self, case: Case, pick: fn(&Lift) -> f64) -> BySource {
+        let three = self.cases.iter().find(|three| three.case == case).expect("one of the cases");
+        SOURCES.map(|source| three.value(source, &pick))
     }
 
     /// A figure of all cases, in units of `unit`, as a series; of the experiment its four means and
@@ -152,160 +164,108 @@ impl Amplitudes {
         let title = "Vibration amplitude of the finite-element cases";
         Figure { published, ..Figure::new("fig15-16", title, caption, 2, panels) }
     }
-
-    /// The claims of both.
-    pub fn claims(&self, all: &[Histories]) -> Vec<Claim> {
-        let [loads, gaps] =
-            ["fig13-14", "fig15-16"].map(|figure| move |id| Claim::of(figure, SECTION, id));
-        // A figure rises (falls) from the first case to another, in every source.
-        type Goes = (fn(&Lift) -> f64, usize, f64);
-        let goes = |of: Claim, (pick, to, sense): Goes, (decimals, unit), claim, reason| {
-            let ends = SOURCES.map(|source| [0, to].map(|case| self.values(source, pick)[case]));
-            let holds = ends.iter().all(|[a, b]| sense * (b - a) > 0.0);
-            let shown = ends.map(|[a, b]| format!("{a:.decimals$} to {b:.decimals$} {unit}"));
-            let found = format!("{} (theory, simulation, virtual rig).", shown.join(", "));
-            of.explained(claim, holds, found, reason)
-        };
-        let off = |published: [f64; 3], pick: fn(&Lift) -> f64| {
-            let ours = self.values(Source::Simulation, pick);
-            std::array::from_fn::<f64, 3, _>(|i| ours[i] / published[i] - 1.0)
-        };
-        let force_off = off(COLLISION_N, |lift| lift.collision_n);
-        let gap_off = off(AMPLITUDE_MM, |lift| lift.gap_mm);
-        let largest = |all: [f64; 3]| all.iter().fold(0.0, |most: f64, part| most.max(part.abs()));
-        let resemblance = resemblance(all);
-        let [expected, simulated] = [Source::Theory, Source::Simulation]
-            .map(|source| self.values(source, |lift| lift.gap_mm));
-        let alike: [f64; 3] = std::array::from_fn(|i| simulated[i] / expected[i] - 1.0);
-        let area = SOURCES.map(|source| {
-            let values = self.values(source, |lift| lift.area_mm2);
-            values[1] / values[0] - 1.0
-        });
-        let force: fn(&Lift) -> f64 = |lift| lift.collision_n;
-        let depth: fn(&Lift) -> f64 = |lift| lift.depth_mm;
-        let stress: fn(&Lift) -> f64 = |lift| lift.impact_kpa;
-        let gap: fn(&Lift) -> f64 = |lift| lift.gap_mm;
-        vec![
-            goes(loads("fe-collision-falls-with-preload"), (force, 1, -1.0), (1, "N"),
-                "The collision force falls from 56.5 N to 51.2 N when the preload rises from 100 N to 120 N \
-                 at 5 mm/s.",
-                "It rises: the wheel climbs with the force that presses it. This is the plainest \
-                 disagreement between the study and any quasi-static climb; no parameter of ours is tuned \
-                 to hide it.",
-            ),
-            goes(loads("fe-collision-grows-with-speed"), (force, 2, 1.0), (1, "N"),
-                "The collision force grows from 56.5 N to 58.6 N when the speed rises from 5 mm/s to 8 mm/s \
-                 at 100 N.",
-                "",
-            ),
-            loads("fe-collision-values").explained(
-                "The three collision forces are 56.5, 51.2 and 58.6 N.",
-                largest(force_off) < 0.10,
-                format!(
-                    "The simulation, not fitted to them, is off by {:+.1} %, {:+.1} % and {:+.1} %.",
-                    100.0 * force_off[0], 100.0 * force_off[1], 100.0 * force_off[2]
-                ),
-                "At 100 N both are met within 10 %; at 120 N it is the trend that differs.",
-            ),
-            goes(loads("displacement-falls-with-preload"), (depth, 1, -1.0), (3, "mm of embedding"),
-                "More preload makes for less elastic displacement in the collision.",
-                "A tread that is pressed harder sinks in deeper; the study says so itself of its \
-                 experiment (figure 22).",
-            ),
-            goes(loads("displacement-grows-with-speed"), (depth, 2, 1.0), (3, "mm of embedding"),
-                "A faster wheel has more elastic displacement in the collision.",
-                "The rubber stiffens with speed: under the same load it sinks in less.",
-            ),
-            goes(loads("stress-falls-with-preload"), (stress, 1, -1.0), (0, "kPa"),
-                "The impact stress falls (ratio 0.953) when the preload rises from 100 N to 120 N.",
-                "It rises with the force; the area grows less.",
-            ),
-            goes(loads("stress-grows-with-speed"), (stress, 2, 1.0), (0, "kPa"),
-                "The impact stress grows (ratio 1.038) when the speed rises from 5 mm/s to 8 mm/s.",
-                "",
-            ),
-            goes(gaps("amplitude-falls-with-preload").fitted(), (gap, 1, -1.0), (3, "mm"),
-                "The vibration amplitude (gap) falls from 1.708 mm to 1.557 mm when the preload rises from \
-                 100 N to 120 N.",
-                "",
-            ),
-            goes(gaps("amplitude-grows-with-speed").fitted(), (gap, 2, 1.0), (3, "mm"),
-                "The vibration amplitude (gap) grows from 1.708 mm to 1.901 mm when the speed rises from 5 mm/s to 8 mm/s.",
-                "",
-            ),
-            gaps("amplitude-values").fitted().judged(
-                "The three amplitudes are 1.7079, 1.5567 and 1.9014 mm.",
-                largest(gap_off) < 0.03,
-                format!(
-                    "The simulation is off by {:+.1} %, {:+.1} % and {:+.1} %. Fitted: three numbers of \
-                     the tread to these three, so that this is no validation.",
-                    100.0 * gap_off[0], 100.0 * gap_off[1], 100.0 * gap_off[2]
-                ),
-            ),
-            gaps("simulated-amplitudes-resemble-theory").fitted().judged(
-                "The simulated amplitudes closely resemble the theoretical ones.",
-                largest(alike) < CLOSE,
-                format!(
-                    "Simulation against theory: {:+.2} %, {:+.2} % and {:+.2} %. The theory is fitted to \
-                     the simulation.",
-                    100.0 * alike[0], 100.0 * alike[1], 100.0 * alike[2]
-                ),
-            ),
-            gaps("simulated-curves-resemble-theory").explained(
-                "The simulated amplitude curves closely resemble the theoretical ones throughout the transition.",
-                resemblance < CLOSE,
-                format!(
-                    "Clearance at the first step from lift-off on: up to {:.1} % apart.",
-                    100.0 * resemblance
-                ),
-                "That elastic ring has one stiffness, that of the instant of lift-off, for which it is \
-                 made; later in the climb the tread relaxes and sinks in deeper than that.",
-            ),
-            Claim::of("fig15-16", "Vibration transmission model", "area-hardly-changes").explained(
-                "Raising the preload reduces the amplitude with minimal changes to the contact area.",
-                area.iter().all(|part| part.abs() < MINIMAL),
-                format!(
-                    "From 100 N to 120 N the contact area at lift-off changes by {:+.1} %, {:+.1} % and \
-                     {:+.1} % (theory, simulation, virtual rig).",
-                    100.0 * area[0], 100.0 * area[1], 100.0 * area[2]
-                ),
-                "The gap falls because the wheel sinks in: amplitude and area cannot be had apart.",
-            ),
-            Claim::of("fig15-16", "Vibration transmission model", "vibration-makes-the-gap").explained(
-                "The gap is the amplitude of a vibration that stress waves excite.",
-                arm_over_gap(all, self) > 0.5,
-                format!(
-                    "The largest deflection of the arm on the virtual rig, with its bending under the force, is {:.2} of the gap.",
-                    arm_over_gap(all, self)
-                ),
-                "The gap is the quasi-static clearance under a wheel that floor and corner carry; it is \
-                 there at rest as well. Inertia of the impact is below 0.5 N, and waves cross the tread \
-                 in a tenth of a millisecond.",
-            ),
-        ]
-    }
 }
 
-/// Largest deflection of the arm over the gap of the same case.
-fn arm_over_gap(all: &[Histories], amplitudes: &Amplitudes) -> f64 {
-    let of = |(one, three): (&Histories, &Three)| {
-        let arm = one.peaks(Quantity::Vibration, Source::Experiment)[0].value * 1e-3;
-        arm / three.value(Source::Experiment, &|lift: &Lift| lift.gap_mm)
+/// The claims of both.
+#[rustfmt::skip]
+pub fn claims(data: &Data) -> Vec<Claim> {
+    let [slow, pressed, fast, _] = cases();
+    let three = [slow, pressed, fast];
+    let goes = |pick: fn(&Lift) -> f64, to, sense, (decimals, unit)| {
+        let text = data.span(Column::Lift(pick), [slow, to], decimals, unit);
+        let found = format!("{text} (theory, simulation, virtual rig).");
+        (data.goes(Column::Lift(pick), [slow, to], sense), found)
     };
-    all.iter().zip(&amplitudes.cases).map(of).fold(0.0, f64::max)
+    let [force, depth, stress, gap]: [fn(&Lift) -> f64; 4] =
+        [|l| l.collision_n, |l| l.depth_mm, |l| l.impact_kpa, |l| l.gap_mm];
+    let simulated = |pick| three.map(|case| data.get(Column::Lift(pick), case)[1]);
+    let force_off = change(COLLISION_N, simulated(force));
+    let gap_off = change(AMPLITUDE_MM, simulated(gap));
+    let theoretical = three.map(|case| data.get(Column::Lift(gap), case)[0]);
+    let alike = change(theoretical, simulated(gap));
+    let area = data.change(Column::Lift(|l| l.area_mm2), [slow, pressed]);
+    let apart = largest(data.histories(three).map(resemblance));
+    let arm_over_gap = largest(three.map(|case| {
+        let [_, _, arm_um] = data.get(Column::Peak(Quantity::Vibration, 0), case);
+        arm_um * 1e-3 / data.get(Column::Lift(gap), case)[2]
+    }));
+    let loads = table("fig13-14", SIMULATED, [
+        row("fe-collision-falls-with-preload", goes(force, pressed, FALLS, (1, "N")),
+            "The collision force falls from 56.5 N to 51.2 N when the preload rises from 100 N to \
+             120 N at 5 mm/s.",
+            "It rises: the wheel climbs with the force that presses it. This is the plainest \
+             disagreement between the study and any quasi-static climb; no parameter of ours is \
+             tuned to hide it."),
+        row("fe-collision-grows-with-speed", goes(force, fast, RISES, (1, "N")),
+            "The collision force grows from 56.5 N to 58.6 N when the speed rises from 5 mm/s to \
+             8 mm/s at 100 N.", ""),
+        row("fe-collision-values", (within(force_off, 0.10), format!(
+                "The simulation, not fitted to them, is off by {}.", percents(force_off, 1, " and ")
+            )),
+            "The three collision forces are 56.5, 51.2 and 58.6 N.",
+            "At 100 N both are met within 10 %; at 120 N it is the trend that differs."),
+        row("displacement-falls-with-preload", goes(depth, pressed, FALLS, (3, "mm of embedding")),
+            "More preload makes for less elastic displacement in the collision.",
+            "A tread that is pressed harder sinks in deeper; the study says so itself of its \
+             experiment (figure 22)."),
+        row("displacement-grows-with-speed", goes(depth, fast, RISES, (3, "mm of embedding")),
+            "A faster wheel has more elastic displacement in the collision.",
+            "The rubber stiffens with speed: under the same load it sinks in less."),
+        row("stress-falls-with-preload", goes(stress, pressed, FALLS, (0, "kPa")),
+            "The impact stress falls (ratio 0.953) when the preload rises from 100 N to 120 N.",
+            "It rises with the force; the area grows less."),
+        row("stress-grows-with-speed", goes(stress, fast, RISES, (0, "kPa")),
+            "The impact stress grows (ratio 1.038) when the speed rises from 5 mm/s to \
+             8 mm/s.", ""),
+    ]);
+    let gaps = table("fig15-16", SIMULATED, [
+        row("amplitude-falls-with-preload", goes(gap, pressed, FALLS, (3, "mm")),
+            "The vibration amplitude (gap) falls from 1.708 mm to 1.557 mm when the preload rises \
+             from 100 N to 120 N.", "").fitted(),
+        row("amplitude-grows-with-speed", goes(gap, fast, RISES, (3, "mm")),
+            "The vibration amplitude (gap) grows from 1.708 mm to 1.901 mm when the speed rises \
+             from 5 mm/s to 8 mm/s.", "").fitted(),
+        row("amplitude-values", (within(gap_off, 0.03), format!(
+                "The simulation is off by {}. Fitted: three numbers of the tread to these three, \
+                 so that this is no validation.", percents(gap_off, 1, " and "))),
+            "The three amplitudes are 1.7079, 1.5567 and 1.9014 mm.", "").fitted(),
+        row("simulated-amplitudes-resemble-theory", (within(alike, CLOSE), format!(
+                "Simulation against theory: {}. The theory is fitted to the simulation.",
+                percents(alike, 2, " and "))),
+            "The simulated amplitudes closely resemble the theoretical ones.", "").fitted(),
+        row("simulated-curves-resemble-theory", (apart < CLOSE, format!(
+                "Clearance at the first step from lift-off on: up to {:.1} % apart.", 100.0 * apart
+            )),
+            "The simulated amplitude curves closely resemble the theoretical ones throughout the \
+             transition.",
+            "That elastic ring has one stiffness, that of the instant of lift-off, for which it is \
+             made; later in the climb the tread relaxes and sinks in deeper than that."),
+    ]);
+    let transmitted = table("fig15-16", TRANSMITTED, [
+        row("area-hardly-changes", (within(area, MINIMAL), format!(
+                "From 100 N to 120 N the contact area at lift-off changes by {} (theory, \
+                 simulation, virtual rig).", percents(area, 1, " and "))),
+            "Raising the preload reduces the amplitude with minimal changes to the contact area.",
+            "The gap falls because the wheel sinks in: amplitude and area cannot be had apart."),
+        row("vibration-makes-the-gap", (arm_over_gap > 0.5, format!(
+                "The largest deflection of the arm on the virtual rig, with its bending under the \
+                 force, is {arm_over_gap:.2} of the gap.")),
+            "The gap is the amplitude of a vibration that stress waves excite.",
+            "The gap is the quasi-static clearance under a wheel that floor and corner carry; it \
+             is there at rest as well. Inertia of the impact is below 0.5 N, and waves cross the \
+             tread in a tenth of a millisecond."),
+    ]);
+    [loads, gaps, transmitted].concat()
 }
 
 /// Largest difference of the simulated clearance from the theoretical one behind its
 /// least value, relative.
-fn resemblance(all: &[Histories]) -> f64 {
-    let of = |one: &Histories| {
-        let [theory, simulation] = one.clearance();
-        let least = theory.iter().enumerate().min_by(|a, b| a.1.1.total_cmp(&b.1.1));
-        let from = least.map_or(0, |(index, _)| index);
-        let apart = |&(t, y): &(f64, f64)| Some((at(&simulation, t)? / y - 1.0).abs());
-        theory[from..].iter().filter_map(apart).fold(0.0, f64::max)
-    };
-    all[..3].iter().map(of).fold(0.0, f64::max)
+fn resemblance(one: &Histories) -> f64 {
+    let [theory, simulation, _] = SOURCES.map(|source| one.clearance(source));
+    let least = theory.iter().enumerate().min_by(|a, b| a.1.1.total_cmp(&b.1.1));
+    let from = least.map_or(0, |(index, _)| index);
+    let apart = |&(t, y): &(f64, f64)| Some((at(&simulation, t)? / y - 1.0).abs());
+    largest(theory[from..].iter().filter_map(apart))
 }
 
 /// The first transition of a run; none if it was not completed.

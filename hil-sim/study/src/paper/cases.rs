@@ -2,11 +2,13 @@
 //! loads.
 
 use super::case::{Case, Loads};
-use super::histories::Quantity;
+use super::claims::Column::Peak;
+use super::claims::{Data, FALLS, RISES, largest, percents, row, table, within};
+use super::histories::Quantity::{Collision, Impact, Vibration};
 use super::histories::{Histories, panels};
 use super::published::{CASES, COLLISION_N};
-use super::transitions::{count_humps, first_rises, peaks_text};
-use crate::figure::{Claim, Figure, SOURCES, Series, Source};
+use super::transitions::count_humps;
+use crate::figure::{Claim, Figure, Series, Source};
 
 const SECTION: &str = "Vibration transmission model";
 
@@ -17,14 +19,14 @@ const GONE: f64 = 0.02;
 const NEARLY: f64 = 0.03;
 
 /// The study's four cases.
-pub fn cases() -> Vec<Case> {
-    CASES.map(|(speed, preload)| Case::new(Loads::Fe, speed, preload)).to_vec()
+pub fn cases() -> [Case; 4] {
+    CASES.map(|(speed, preload)| Case::new(Loads::Fe, speed, preload))
 }
 
 pub fn figure(all: &[Histories]) -> Figure {
     let mut panels = panels(all);
     for ((panel, one), force) in panels.iter_mut().zip(all).zip(COLLISION_N) {
-        let when = one.peaks(Quantity::Collision, Source::Simulation)[0].time_s;
+        let when = one.peaks(Collision, Source::Simulation)[0].time_s;
         panel.series.push(Series::new(Source::Published, vec![(when, force)]));
     }
     let caption =
@@ -37,114 +39,79 @@ pub fn figure(all: &[Histories]) -> Figure {
     Figure::new("fig11", title, caption, CASES.len(), panels)
 }
 
-/// The claims about it; `all` in the order of [`CASES`].
-pub fn claims(all: &[Histories]) -> Vec<Claim> {
-    let of = |id| Claim::of("fig11", SECTION, id);
-    let [slow, pressed, fast, slowest] = [&all[0], &all[1], &all[2], &all[3]];
-    // The first peak rises (falls) from the one case to the other.
-    let rises = |id, (a, b): (&Histories, &Histories), quantity, sense, claim, reason| {
-        let [before, after] = [a, b].map(|one| peaks_text(one, quantity));
-        let found = format!("{before}; {after} (theory; simulation; virtual rig, by stage).");
-        of(id).explained(claim, first_rises(a, b, quantity, sense), found, reason)
+/// The claims about it.
+#[rustfmt::skip]
+pub fn claims(data: &Data) -> Vec<Claim> {
+    let all = data.histories(cases());
+    let [slow, pressed, fast, slowest] = cases();
+    let first = |quantity, [from, to]: [Case; 2], sense| {
+        let peaks = [from, to].map(|case| data.peaks_text(quantity, case)).join("; ");
+        let found = format!("{peaks} (theory; simulation; virtual rig, by stage).");
+        (data.goes(Peak(quantity, 0), [from, to], sense), found)
     };
-    let (collision, impact, vibration) =
-        (Quantity::Collision, Quantity::Impact, Quantity::Vibration);
-    let stage = |number: usize| {
-        let [of_pressed, of_slow] = [pressed, slow].map(|one| one.stage(collision, number));
-        std::array::from_fn::<f64, 3, _>(|source| of_pressed[source] / of_slow[source] - 1.0)
+    let more = |stage| data.change(Peak(Collision, stage), [slow, pressed]);
+    let more_found = |stage| {
+        let parts = percents(more(stage), 1, ", ");
+        format!("{parts} from 100 to 120 N at 5 mm/s (theory, simulation, virtual rig).")
     };
-    let percent = |parts: [f64; 3]| parts.map(|part| format!("{:+.1} %", 100.0 * part)).join(", ");
-    let humps = |one: &Histories| {
-        let points = one.points(collision, Source::Simulation);
+    let humps = all.map(|one| {
+        let points = one.points(Collision, Source::Simulation);
         count_humps(points.iter().map(|p| p.1), 0.02)
+    });
+    let humps = humps.into_iter().fold(0, usize::max);
+    let left = largest(all.into_iter().flat_map(|one| one.left_over(Impact)));
+    let less = cases()
+        .map(|case| data.get(Peak(Collision, 0), case).map(|force| force - case.preload_n));
+    let impact = cases().map(|case| data.get(Peak(Impact, 0), case));
+    // Whether two cases are in the same order by both, in every source.
+    let alike = |a: usize, b: usize| {
+        (0..3).all(|of| (less[a][of] < less[b][of]) == (impact[a][of] < impact[b][of]))
     };
-    let humps = all.iter().map(humps).max().unwrap_or(0);
-    vec![
-        of("collision-decays-periodically").explained(
+    let in_order = (0..4).all(|a| (0..4).all(|b| alike(a, b)));
+    let stresses = [0, 1, 2, 3].map(|i| format!("{:.1} N, {:.0} kPa", less[i][1], impact[i][1]));
+    table("fig11", SECTION, [
+        row("collision-decays-periodically", (humps > 3, format!(
+                "At most {humps} peaks in a deployment with three transitions, in the simulation."
+            )),
             "The collision force decays periodically, because the tread is elastic.",
-            humps > 3,
-            format!("At most {humps} peaks in a deployment with three transitions, in the simulation."),
-            "One peak a transition. The wheel closes in on the corner at 2 to 4 mm/s and never leaves it: \
-             it climbs and does not bounce.",
-        ),
-        rises("collision-falls-with-preload", (slow, pressed), collision, -1.0,
-            "At 5 mm/s the collision force of the first transition is smaller at 120 N than at 100 N.",
-            "It is larger, as climbing must be: the axial force is the pressing force times the tangent of \
-             the angle at which the corner bears. The study contradicts itself here between its first and \
-             its second transition.",
-        ),
-        rises("collision-grows-with-speed", (slow, fast), collision, 1.0,
-            "At 100 N the collision is larger at 8 mm/s than at 5 mm/s.",
-            "",
-        ),
-        rises("collision-grows-with-speed-120", (slowest, pressed), collision, 1.0,
-            "At 120 N, too, the collision grows with the speed (5 mm/s against 3 mm/s).",
-            "",
-        ),
-        of("second-collision-grows-with-preload").judged(
-            "In the second transition more preload makes for a larger force.",
-            stage(1).iter().all(|&part| part > 0.0),
-            format!("{} from 100 to 120 N at 5 mm/s (theory, simulation, virtual rig).", percent(stage(1))),
-        ),
-        of("third-collision-equal").explained(
-            "In the third transition 20 N more preload make no difference: the peaks are nearly identical.",
-            stage(2).iter().all(|part| part.abs() < NEARLY),
-            format!("{} from 100 to 120 N at 5 mm/s (theory, simulation, virtual rig).", percent(stage(2))),
-            "Nothing in the third transition differs but the inclination of the arm, by two degrees from the \
-             second: more preload has the same effect in all three.",
-        ),
-        of("stress-of-collision-less-preload").explained(
-            "The stress wave is determined by the difference between collision force and preload.",
-            SOURCES.into_iter().all(|source| {
-                let of = |quantity| all.iter().map(move |one: &Histories| one.peaks(quantity, source)[0].value);
-                let less = of(collision).zip(all).map(|(force, one)| force - one.case.preload_n);
-                order(&less.collect::<Vec<_>>()) == order(&of(impact).collect::<Vec<_>>())
-            }),
-            format!(
+            "One peak a transition. The wheel closes in on the corner at 2 to 4 mm/s and never \
+             leaves it: it climbs and does not bounce."),
+        row("collision-falls-with-preload", first(Collision, [slow, pressed], FALLS),
+            "At 5 mm/s the collision force of the first transition is smaller at 120 N than at \
+             100 N.",
+            "It is larger, as climbing must be: the axial force is the pressing force times the \
+             tangent of the angle at which the corner bears. The study contradicts itself here \
+             between its first and its second transition."),
+        row("collision-grows-with-speed", first(Collision, [slow, fast], RISES),
+            "At 100 N the collision is larger at 8 mm/s than at 5 mm/s.", ""),
+        row("collision-grows-with-speed-120", first(Collision, [slowest, pressed], RISES),
+            "At 120 N, too, the collision grows with the speed (5 mm/s against 3 mm/s).", ""),
+        row("second-collision-grows-with-preload",
+            (data.goes(Peak(Collision, 1), [slow, pressed], RISES), more_found(1)),
+            "In the second transition more preload makes for a larger force.", ""),
+        row("third-collision-equal", (within(more(2), NEARLY), more_found(2)),
+            "In the third transition 20 N more preload make no difference: the peaks are nearly \
+             identical.",
+            "Nothing in the third transition differs but the inclination of the arm, by two \
+             degrees from the second: more preload has the same effect in all three."),
+        row("stress-of-collision-less-preload", (in_order, format!(
                 "Collision less preload and impact of the four cases (simulation): {}.",
-                all.iter()
-                    .map(|one| {
-                        let peak = |quantity| one.peaks(quantity, Source::Simulation)[0].value;
-                        format!("{:.1} N, {:.0} kPa", peak(collision) - one.case.preload_n, peak(impact))
-                    })
-                    .collect::<Vec<_>>()
-                    .join("; ")
-            ),
-            "The two are not even in the same order: the speed stiffens the tread and narrows the contact, \
-             which raises the stress at nearly the same force.",
-        ),
-        of("impact-decays-to-zero").judged(
-            "The impact load decays to zero.",
-            all.iter().all(|one| {
-                SOURCES.into_iter().all(|source| one.left_over(impact, source) < GONE)
-            }),
-            format!(
-                "Once the wheel is on the last sleeve at most {:.3} of the peak is left, in any case and \
-                 source.",
-                all.iter()
-                    .flat_map(|one| SOURCES.map(|source| one.left_over(impact, source)))
-                    .fold(0.0, f64::max)
-            ),
-        ),
-        rises("impact-falls-with-preload", (slow, pressed), impact, -1.0,
+                stresses.join("; "))),
+            "The stress wave is determined by the difference between collision force and preload.",
+            "The two are not even in the same order: the speed stiffens the tread and narrows the \
+             contact, which raises the stress at nearly the same force."),
+        row("impact-decays-to-zero", (left < GONE, format!(
+                "Once the wheel is on the last sleeve at most {left:.3} of the peak is left, in \
+                 any case and source.")),
+            "The impact load decays to zero.", ""),
+        row("impact-falls-with-preload", first(Impact, [slow, pressed], FALLS),
             "More preload makes for a smaller impact in the first transition.",
-            "The force grows more than the area on which it acts.",
-        ),
-        rises("vibration-grows-with-speed", (slow, fast), vibration, 1.0,
-            "At the same load and preload the vibration amplitude grows with the speed.",
-            "",
-        ),
-        rises("vibration-falls-with-preload", (slow, pressed), vibration, -1.0,
+            "The force grows more than the area on which it acts."),
+        row("vibration-grows-with-speed", first(Vibration, [slow, fast], RISES),
+            "At the same load and preload the vibration amplitude grows with the speed.", ""),
+        row("vibration-falls-with-preload", first(Vibration, [slow, pressed], FALLS),
             "At the same load and speed more preload makes for a smaller vibration amplitude.",
-            "The arm's deflection follows the collision force, which grows. What does fall is the gap, which \
-             the study equates with the amplitude: figures 15 and 16.",
-        ),
-    ]
-}
-
-/// Places of the values in ascending order.
-fn order(values: &[f64]) -> Vec<usize> {
-    let mut places: Vec<usize> = (0..values.len()).collect();
-    places.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
-    places
+            "The arm's deflection follows the collision force, which grows. What does fall is the \
+             gap, which the study equates with the amplitude: figures 15 and 16."),
+    ])
 }

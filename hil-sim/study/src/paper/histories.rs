@@ -8,6 +8,9 @@ use super::published::LOG_S;
 use super::{simulation, theory};
 use crate::figure::{Chart, SOURCES, Series, Source};
 
+/// What has a curve of its own, beside the means.
+const MODELS: [Source; 2] = [Source::Theory, Source::Simulation];
+
 /// One of this many points of theory and simulation is shown.
 const SHOWN_OF: usize = 8;
 
@@ -39,6 +42,8 @@ pub struct Histories {
     simulation: History,
     /// Four means of the virtual rig.
     means: Vec<History>,
+    /// The mean of these.
+    experiment: History,
     /// When the first step has been passed, s.
     pub first_passed_s: f64,
 }
@@ -54,53 +59,40 @@ impl Histories {
             let logs: Vec<&History> = group.iter().map(|&rig| &experiment.runs[rig].log).collect();
             History::mean(&logs, lines)
         };
+        let means: Vec<History> = groups().iter().map(mean).collect();
         Ok(Self {
             case,
             theory: theory::deployment(&case, &arms)?,
             simulation: simulation::deployment(&case, &arms)?,
-            means: groups().iter().map(mean).collect(),
+            experiment: History::mean(&means.iter().collect::<Vec<_>>(), lines),
+            means,
             first_passed_s: case.loads.rig().rig.step_positions_mm[0] / case.speed_mm_s,
         })
     }
 
-    /// Values of a quantity from a source; of the experiment the mean of its means.
-    pub fn points(&self, quantity: Quantity, source: Source) -> Points {
+    /// The deployment from a source; from the experiment the mean of its means.
+    fn history(&self, source: Source) -> &History {
         match source {
-            Source::Theory => quantity.of(&self.theory).clone(),
-            Source::Simulation => quantity.of(&self.simulation).clone(),
-            _ => {
-                let times = quantity.of(&self.means[0]).iter().map(|point| point.0);
-                times.zip(self.mean(|history, i| quantity.of(history)[i].1)).collect()
-            }
+            Source::Theory => &self.theory,
+            Source::Simulation => &self.simulation,
+            _ => &self.experiment,
         }
     }
 
-    /// The mean of the means of what `of` gives for each of their points.
-    fn mean(&self, of: impl Fn(&History, usize) -> f64) -> Vec<f64> {
-        let sum = |i: usize| self.means.iter().map(|mean| of(mean, i)).sum::<f64>();
-        let count = self.means.len() as f64;
-        (0..self.means[0].position_mm.len()).map(|i| sum(i) / count).collect()
-    }
-
-    /// Axial position of the wheel at the points of a source, mm; of the experiment the mean
-    /// of its means.
-    fn positions_mm(&self, source: Source) -> Vec<f64> {
-        match source {
-            Source::Theory => self.theory.position_mm.clone(),
-            Source::Simulation => self.simulation.position_mm.clone(),
-            _ => self.mean(|history, i| history.position_mm[i]),
-        }
+    /// Values of a quantity from a source.
+    pub fn points(&self, quantity: Quantity, source: Source) -> &Points {
+        quantity.of(self.history(source))
     }
 
     /// Largest value in each of the three transitions. They are told apart by where the wheel
     /// is: the experiment's is slower than the case while its preload rises.
     pub fn peaks(&self, quantity: Quantity, source: Source) -> [Peak; STAGES] {
-        let positions_mm = self.positions_mm(source);
+        let positions_mm = &self.history(source).position_mm;
         let points = self.points(quantity, source);
         let ends_mm = stage_ends_mm(&self.case);
         std::array::from_fn(|stage| {
             let from_mm = if stage == 0 { 0.0 } else { ends_mm[stage - 1] };
-            let all = positions_mm.iter().zip(&points);
+            let all = positions_mm.iter().zip(points);
             let all =
                 all.map(|(&position_mm, &(time_s, value))| Peak { time_s, position_mm, value });
             let within = all.filter(|p| (from_mm..ends_mm[stage]).contains(&p.position_mm));
@@ -108,50 +100,47 @@ impl Histories {
         })
     }
 
-    /// The largest value of a stage from each source.
-    pub fn stage(&self, quantity: Quantity, stage: usize) -> [f64; 3] {
-        SOURCES.map(|source| self.peaks(quantity, source)[stage].value)
+    /// The largest values of the three transitions, from each source.
+    pub fn peak_values(&self, quantity: Quantity) -> [[f64; STAGES]; 3] {
+        SOURCES.map(|source| self.peaks(quantity, source).map(|peak| peak.value))
     }
 
     /// Largest value after the third transition, beyond the largest before the first, over
-    /// the largest of all.
-    pub fn left_over(&self, quantity: Quantity, source: Source) -> f64 {
-        let points = self.points(quantity, source);
-        let positions_mm = self.positions_mm(source);
+    /// the largest of all, from each source.
+    pub fn left_over(&self, quantity: Quantity) -> [f64; 3] {
         // The wheel's patch behind the last edge, and the arm's ring-down.
         let after = stage_ends_mm(&self.case)[STAGES - 1] + LEAVES_MM + 0.2 * self.case.speed_mm_s;
-        let most = |from: f64, to: f64| {
-            let all = positions_mm.iter().zip(&points);
-            let within = all.filter(|(position_mm, _)| (from..=to).contains(*position_mm));
-            within.map(|(_, p)| p.1.abs()).fold(0.0, f64::max)
-        };
-        (most(after, f64::INFINITY) - most(f64::NEG_INFINITY, BEFORE_MM)).max(0.0)
-            / most(f64::NEG_INFINITY, f64::INFINITY)
+        SOURCES.map(|source| {
+            let points = self.points(quantity, source);
+            let most = |from: f64, to: f64| {
+                let all = self.history(source).position_mm.iter().zip(points);
+                let within = all.filter(|(position_mm, _)| (from..=to).contains(*position_mm));
+                within.map(|(_, p)| p.1.abs()).fold(0.0, f64::max)
+            };
+            (most(after, f64::INFINITY) - most(f64::NEG_INFINITY, BEFORE_MM)).max(0.0)
+                / most(f64::NEG_INFINITY, f64::INFINITY)
+        })
     }
 
     pub fn panel(&self, quantity: Quantity) -> Chart {
         let title = format!("{} {}", ["(a)", "(b)", "(c)"][quantity as usize], self.case.name());
         let means = self.means.iter().map(|mean| quantity.of(mean).clone());
-        let theory = Series::new(Source::Theory, thin(quantity.of(&self.theory)));
-        let simulation = Series::new(Source::Simulation, thin(quantity.of(&self.simulation)));
-        let series = [theory, simulation].into_iter().chain(Series::means(means)).collect();
+        let of = |source| Series::new(source, thin(self.points(quantity, source)));
+        let series = MODELS.map(of).into_iter().chain(Series::means(means)).collect();
         Chart::new(title, "time, s", quantity.axis(), series)
     }
 
-    /// Clearance from the root of the first step until the centre passes it, theory and
-    /// simulation.
-    pub fn clearance(&self) -> [Points; 2] {
-        [&self.theory, &self.simulation].map(|history| history.clearance_until(f64::INFINITY))
+    /// Clearance from the root of the first step until the centre passes it.
+    pub fn clearance(&self, source: Source) -> Points {
+        self.history(source).clearance_until(f64::INFINITY)
     }
 
     /// The clearance at the first step as a plot.
     pub fn clearance_panel(&self) -> Chart {
         let title = format!("Clearance (Fig. 16): {}", self.case.name());
-        let [theory, simulation] =
-            self.clearance().map(|points| points.into_iter().step_by(SHOWN_OF).collect());
+        let shown = |source| self.clearance(source).into_iter().step_by(SHOWN_OF).collect();
         let means = self.means.iter().map(|m| m.clearance_until(self.first_passed_s - 0.2));
-        let series = [(Source::Theory, theory), (Source::Simulation, simulation)]
-            .map(|(source, points)| Series::new(source, points));
+        let series = MODELS.map(|source| Series::new(source, shown(source)));
         let series = series.into_iter().chain(Series::means(means)).collect();
         Chart::new(title, "time, s", "root clearance, mm", series)
     }

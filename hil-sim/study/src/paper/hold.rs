@@ -5,11 +5,11 @@ use anyhow::Result;
 use interstage::rig::Rig;
 
 use super::case::{Case, Loads};
-use super::experiment::{Experiment, Reading, marks};
+use super::claims::{BySource, Column, Data, largest, percents, row, table, within};
+use super::experiment::{Experiment, Reading, Run, marks};
 use super::histories::Points;
 use super::published::{CONSTRAINED_HZ, FREE_HZ, LEAST_PRELOAD_N, LEAST_SPEED_MM_S, RIG_PRELOAD_N};
 use super::simulation;
-use super::sweeps::Sweep;
 use super::theory::{self, Drive};
 use crate::figure::{Chart, Claim, Figure, Series, Source};
 use crate::reference::beam::BeamError;
@@ -40,8 +40,8 @@ const DISCUSSED: &str = "Analysis and discussion of test results";
 pub struct Hold {
     /// Preload that holds the gap of the safe point against speed: theory, simulation.
     preload: (Points, Points),
-    /// Gaps of [`CASES`] from the three sources, mm.
-    gaps: [[f64; 3]; 3],
+    /// Gap of each of [`CASES`], mm.
+    gaps: [BySource; 3],
     /// Gaps of [`CASES`] in every run, mm.
     read: Vec<Vec<f64>>,
     /// Preload below which one wheel cannot lift its share of the study's top load, N.
@@ -54,31 +54,38 @@ pub struct Hold {
 }
 
 impl Hold {
-    pub fn cases() -> Vec<Case> {
-        CASES.map(|(speed, preload)| Case::new(Loads::Prototype, speed, preload)).to_vec()
+    pub fn cases() -> [Case; 3] {
+        CASES.map(|(speed, preload)| Case::new(Loads::Prototype, speed, preload))
+    }
+
+    /// Mean gap of the three transitions in one of the cases, mm.
+    pub fn gap(&self, case: Case) -> BySource {
+        self.gaps[Self::cases().iter().position(|one| *one == case).expect("one of the cases")]
     }
 
     /// Theory and simulation, and the experiments on [`Hold::cases`].
     pub fn new(experiments: &[&Experiment]) -> Result<Self> {
-        let case = |index: usize| Case::new(Loads::Prototype, CASES[index].0, CASES[index].1);
+        let [safe, ..] = Self::cases();
         let simulated = |case: &Case| simulation::lift(case, Drive::Driven, 1).map(|l| l.gap_mm);
         let mut gaps = [[0.0; 3]; 3];
         let mut all_read = Vec::new();
-        for (index, experiment) in experiments.iter().enumerate() {
+        for (gaps, experiment) in gaps.iter_mut().zip(experiments) {
             let read: Vec<f64> =
                 experiment.runs.iter().filter_map(|run| run.mean(|r| r.gap_mm)).collect();
-            gaps[0][index] = theory::mean_lift(&case(index), Drive::Driven)?.gap_mm;
-            gaps[1][index] = simulated(&case(index))?;
-            gaps[2][index] = read.iter().sum::<f64>() / read.len() as f64;
+            *gaps = [
+                theory::mean_lift(&experiment.case, Drive::Driven)?.gap_mm,
+                simulated(&experiment.case)?,
+                read.iter().sum::<f64>() / read.len() as f64,
+            ];
             all_read.push(read);
         }
         let wheel = Wheel::try_build(&Loads::Prototype.rig())?;
-        let thrust = case(0).pressing_n(1) - case(0).preload_n;
-        let setup = theory::setup(&case(0), Drive::Driven, 1);
-        let wanted = theory::lift(&case(0), Drive::Driven, 1)?.gap_mm;
+        let thrust = safe.pressing_n(1) - safe.preload_n;
+        let setup = theory::setup(&safe, Drive::Driven, 1);
+        let wanted = theory::lift(&safe, Drive::Driven, 1)?.gap_mm;
         let force_n = |speed_mm_s| wheel.force_n(wanted, &CrossingSetup { speed_mm_s, ..setup });
         let theory = SPEEDS_MM_S.map(|v| (v, force_n(v) - thrust)).to_vec();
-        let target = gaps[1][0];
+        let target = gaps[0][1];
         let mut simulation = Vec::new();
         for speed in SPEEDS_MM_S {
             let gap = |preload| simulated(&Case::new(Loads::Prototype, speed, preload));
@@ -106,7 +113,7 @@ impl Hold {
         for (x, read) in self.read.iter().enumerate() {
             marks(x as f64, read, &mut experiment);
         }
-        let numbered = |index: usize| (0_u8..).map(f64::from).zip(self.gaps[index]).collect();
+        let numbered = |source: usize| [0, 1, 2].map(|x| (x as f64, self.gaps[x][source])).to_vec();
         let gap = vec![
             Series::new(Source::Theory, numbered(0)),
             Series::new(Source::Simulation, numbered(1)),
@@ -126,117 +133,93 @@ impl Hold {
         let title = "The gap held by raising the preload at the step";
         Figure::new("conclusion", title, caption.to_owned(), 2, panels)
     }
+}
 
-    /// The claims. `all` are all experiments at rig loads.
-    pub fn claims(&self, all: &[&Experiment], speed: &Sweep) -> Vec<Claim> {
-        let of = |section, id| Claim::of("conclusion", section, id);
-        let apart = |index: usize| self.gaps.map(|gaps| gaps[index] / gaps[0] - 1.0);
-        let percent =
-            |parts: [f64; 3]| parts.map(|part| format!("{:+.2} %", 100.0 * part)).join(", ");
-        let at_8 = self.preload.1[SPEEDS_MM_S.len() - 1].1;
-        let readings = || all.iter().flat_map(|e| &e.runs).flat_map(|run| &run.crossings);
-        let runs = || all.iter().flat_map(|e| &e.runs);
-        let separation = runs().map(|run| run.separation_mm).fold(0.0, f64::max);
-        let swings: Vec<f64> = readings().map(|r: &Reading| r.preload_swing_n).collect();
-        let swing = swings.iter().sum::<f64>() / swings.len().max(1) as f64;
-        let rig = Rig::prototype();
-        let unregulated = rig.preload.spring_n_per_mm * rig.rig.step_height_mm;
-        let staged = runs().all(|run| run.stages.iter().all(|&s| s));
-        let gap = &speed.gap;
-        let (low, high) = (gap.simulation[0], gap.simulation[gap.simulation.len() - 1]);
-        let (from, to) = (gap.at[0], gap.at[gap.at.len() - 1]);
-        let pitch = rig.drive.ripple_pitch_mm;
-        let least_hz = LEAST_SPEED_MM_S / pitch;
-        let (resonant, at_fastest) = self.response_um;
-        vec![
-            of(DISCUSSED, "preload-holds-the-gap").judged(
-                "A faster wheel keeps the gap if the radial preload is raised at the transition.",
-                apart(2).iter().all(|part| part.abs() < SAME),
-                format!(
-                    "At 8 mm/s 40 N give the gap of 5 mm/s and 33.3 N within {} (theory, simulation, \
-                     experiment), where 33.3 N are off by {}. The ring asks for {at_8:.1} N: with the \
-                     first, the range of preloads that the study ran on its rig, {:.0} to {:.0} N, though \
-                     nothing is fitted to that.",
-                    percent(apart(2)), percent(apart(1)), RIG_PRELOAD_N.0, RIG_PRELOAD_N.1
-                ),
-            ),
-            of(DISCUSSED, "gap-as-on-the-continuous-surface").explained(
-                "Raising the preload makes the gap in the transition that of the continuous surface.",
-                readings().map(|r| r.true_gap_mm).fold(0.0, f64::max) <= separation,
-                format!(
-                    "On the continuous wall wheel and wall never part (largest separation {separation:.3} \
-                     mm); at a step the least gap of all runs is {:.2} mm.",
-                    readings().map(|r| r.true_gap_mm).fold(f64::INFINITY, f64::min)
-                ),
-                "A wheel that bears on floor and corner always leaves the root of the step free. What can be \
-                 held is the gap of a slower crossing, and the controller takes that as its reference.",
-            ),
-            of(INTRODUCED, "gap-in-proportion-to-speed").explained(
-                "At constant preload the gap expands in proportion to the speed.",
-                ((high / low) / (to / from) - 1.0).abs() < 0.1,
-                format!(
-                    "The speed times {:.2} makes the gap times {:.3} (simulation, at 40 N).",
-                    to / from, high / low
-                ),
-                "It grows, but far less than in proportion, and nonlinearly, as the study finds in its \
-                 figure 21: the gap of a wheel at rest is not zero.",
-            ),
-            of(INTRODUCED, "preload-follows-the-diameter").judged(
-                "At constant speed the radial preload fluctuates with the sleeve's diameter.",
-                swing > Noise::usual().preload_sensor_n,
-                format!(
-                    "By {swing:.2} N on average up to lift-off, with the preload loop closed; the spring \
-                     alone would give {unregulated:.1} N a step."
-                ),
-            ),
-            of(INTRODUCED, "least-preload-100").explained(
-                "Under its top load the drive needs a radial preload of about 100 N (one third of the entire \
-                 drive) to work.",
-                (self.least_preload_n / LEAST_PRELOAD_N - 1.0).abs() < 0.2,
-                format!(
-                    "A wheel that lifts 20 N of the 60 N at 5 mm/s grips over a step from {:.0} N on, with \
-                     the friction of {} and the arm of our rig.",
-                    self.least_preload_n, rig.plant.mu
-                ),
-                "There is such a bound, but it depends on the friction and on the load that falls to one \
-                 wheel, and neither is published; with ours it lies lower.",
-            ),
-            of(INTRODUCED, "slip-is-possible").judged(
-                "At a step the drive may slip or retreat.",
-                self.friction_alone > rig.plant.mu,
-                format!(
-                    "One wheel that lifts all of the rig's 20 N at 5 mm/s and 33.3 N between parallel guides \
-                     needs a friction of {:.2}; ours has {}.",
-                    self.friction_alone, rig.plant.mu
-                ),
-            ),
-            of(INTRODUCED, "least-speed-meets-a-natural-frequency").explained(
-                "At the least useful speed of 2.9741 mm/s the wheel is excited close to its natural \
-                 frequency.",
-                [CONSTRAINED_HZ, FREE_HZ].iter().any(|hz| (least_hz / hz - 1.0).abs() < 0.1),
-                format!(
-                    "The fastest periodic excitation that a drive like ours has there, its torque ripple, \
-                     comes at {least_hz:.1} Hz; the published modes are {FREE_HZ} and {CONSTRAINED_HZ} Hz."
-                ),
-                "A tread passes its own contact in about a second at that speed. How the study gets 2.9741 \
-                 mm/s is not in its text, so that it cannot be followed.",
-            ),
-            of(DISCUSSED, "resonance-is-worst").judged(
-                "Near resonance the vibration is largest; keeping the excitation away from it keeps the \
-                 vibration small.",
-                resonant > 5.0 * at_fastest,
-                format!(
-                    "A force of 1 N at {CONSTRAINED_HZ} Hz moves the arm by {resonant:.1} µm, at the ripple's frequency \
-                     of 8 mm/s by {at_fastest:.2} µm."
-                ),
-            ),
-            of("Boundary conditions", "six-stages").judged(
-                "A complete transition has six contact stages.",
-                staged,
-                "The controller recognises all six in every run of the virtual rig.".into(),
-            ),
-        ]
-    }
+/// The claims.
+#[rustfmt::skip]
+pub fn claims(data: &Data) -> Vec<Claim> {
+    let Hold { preload, least_preload_n, friction_alone, response_um, .. } = &data.hold;
+    let (resonant, at_fastest) = response_um;
+    let [safe, faster, held] = Hold::cases();
+    let apart = |case| data.change(Column::HeldGap, [safe, case]);
+    let rig = Rig::prototype();
+    let at_rig = data.experiments.iter().filter(|e| e.case.loads == Loads::Prototype);
+    let runs: Vec<&Run> = at_rig.flat_map(|e| &e.runs).collect();
+    let readings: Vec<&Reading> = runs.iter().flat_map(|run| &run.crossings).collect();
+    let separation = largest(runs.iter().map(|run| run.separation_mm));
+    let gaps = || readings.iter().map(|r| r.true_gap_mm);
+    let swings: f64 = readings.iter().map(|r| r.preload_swing_n).sum();
+    let swing = swings / readings.len().max(1) as f64;
+    let gap = &data.speed.gap;
+    let times = |values: &[f64]| values[values.len() - 1] / values[0];
+    let (speed_times, gap_times) = (times(&gap.experiment.at), times(&gap.simulation));
+    let least_hz = LEAST_SPEED_MM_S / rig.drive.ripple_pitch_mm;
+    let concluded = table("conclusion", DISCUSSED, [
+        row("preload-holds-the-gap", (within(apart(held), SAME), format!(
+                "At 8 mm/s 40 N give the gap of 5 mm/s and 33.3 N within {} (theory, simulation, \
+                 experiment), where 33.3 N are off by {}. The ring asks for {:.1} N: with the \
+                 first, the range of preloads that the study ran on its rig, {:.0} to {:.0} N, \
+                 though nothing is fitted to that.",
+                percents(apart(held), 2, ", "), percents(apart(faster), 2, ", "),
+                preload.1[SPEEDS_MM_S.len() - 1].1, RIG_PRELOAD_N.0, RIG_PRELOAD_N.1)),
+            "A faster wheel keeps the gap if the radial preload is raised at the transition.", ""),
+        row("gap-as-on-the-continuous-surface", (largest(gaps()) <= separation, format!(
+                "On the continuous wall wheel and wall never part (largest separation \
+                 {separation:.3} mm); at a step the least gap of all runs is \
+                 {:.2} mm.", gaps().fold(f64::INFINITY, f64::min))),
+            "Raising the preload makes the gap in the transition that of the continuous surface.",
+            "A wheel that bears on floor and corner always leaves the root of the step free. What \
+             can be held is the gap of a slower crossing, and the controller takes that as its \
+             reference."),
+    ]);
+    let introduced = table("conclusion", INTRODUCED, [
+        row("gap-in-proportion-to-speed", ((gap_times / speed_times - 1.0).abs() < 0.1, format!(
+                "The speed times {speed_times:.2} makes the gap times {gap_times:.3} (simulation, \
+                 at 40 N).")),
+            "At constant preload the gap expands in proportion to the speed.",
+            "It grows, but far less than in proportion, and nonlinearly, as the study finds in its \
+             figure 21: the gap of a wheel at rest is not zero."),
+        row("preload-follows-the-diameter", (swing > Noise::usual().preload_sensor_n, format!(
+                "By {swing:.2} N on average up to lift-off, with the preload loop closed; the \
+                 spring alone would give {:.1} N a \
+                 step.", rig.preload.spring_n_per_mm * rig.rig.step_height_mm)),
+            "At constant speed the radial preload fluctuates with the sleeve's diameter.", ""),
+        row("least-preload-100", ((least_preload_n / LEAST_PRELOAD_N - 1.0).abs() < 0.2, format!(
+                "A wheel that lifts 20 N of the 60 N at 5 mm/s grips over a step from \
+                 {least_preload_n:.0} N on, with the friction of {} and the arm of our \
+                 rig.", rig.plant.mu)),
+            "Under its top load the drive needs a radial preload of about 100 N (one third of the \
+             entire drive) to work.",
+            "There is such a bound, but it depends on the friction and on the load that falls to \
+             one wheel, and neither is published; with ours it lies lower."),
+        row("slip-is-possible", (*friction_alone > rig.plant.mu, format!(
+                "One wheel that lifts all of the rig's 20 N at 5 mm/s and 33.3 N between parallel \
+                 guides needs a friction of {friction_alone:.2}; ours has {}.", rig.plant.mu)),
+            "At a step the drive may slip or retreat.", ""),
+        row("least-speed-meets-a-natural-frequency",
+            ([CONSTRAINED_HZ, FREE_HZ].iter().any(|hz| (least_hz / hz - 1.0).abs() < 0.1), format!(
+                "The fastest periodic excitation that a drive like ours has there, its torque \
+                 ripple, comes at {least_hz:.1} Hz; the published modes are {FREE_HZ} and \
+                 {CONSTRAINED_HZ} Hz.")),
+            "At the least useful speed of 2.9741 mm/s the wheel is excited close to its natural \
+             frequency.",
+            "A tread passes its own contact in about a second at that speed. How the study gets \
+             2.9741 mm/s is not in its text, so that it cannot be followed."),
+    ]);
+    let resonance = table("conclusion", DISCUSSED, [
+        row("resonance-is-worst", (*resonant > 5.0 * at_fastest, format!(
+                "A force of 1 N at {CONSTRAINED_HZ} Hz moves the arm by {resonant:.1} µm, at the \
+                 ripple's frequency of 8 mm/s by {at_fastest:.2} µm.")),
+            "Near resonance the vibration is largest; keeping the excitation away from it keeps \
+             the vibration small.", ""),
+    ]);
+    let stages = table("conclusion", "Boundary conditions", [
+        row("six-stages",
+            (runs.iter().all(|run| run.stages == [true; 6]),
+             "The controller recognises all six in every run of the virtual rig.".into()),
+            "A complete transition has six contact stages.", ""),
+    ]);
+    [concluded, introduced, resonance, stages].concat()
 }
 
 /// Preload at which `gap` is the wanted one, N: secant steps, from two guesses.

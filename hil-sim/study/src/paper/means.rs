@@ -75,23 +75,6 @@ impl Means {
         ranges.map(|(low, high)| high - low).fold(0.0, f64::max)
     }
 
-    /// Rise from the first place to the last, of the mean of means.
-    pub fn rise(&self) -> f64 {
-        let middle = self.middle();
-        middle[middle.len() - 1] - middle[0]
-    }
-
-    /// [`bend`] of each mean.
-    pub fn bends(&self) -> Vec<f64> {
-        self.curves.iter().map(|curve| bend(curve)).collect()
-    }
-
-    /// Whether every mean changes with the same sign from each place to the next: up for a
-    /// positive `sense`.
-    pub fn all_go(&self, sense: f64) -> bool {
-        self.curves.iter().all(|curve| curve.windows(2).all(|w| sense * (w[1] - w[0]) > 0.0))
-    }
-
     /// The means as series, the first with the range over all rigs.
     pub fn series(&self) -> Vec<Series> {
         let band = self.at.iter().zip(&self.range).map(|(&x, &(low, high))| (x, low, high));
@@ -139,6 +122,7 @@ mod tests {
 
     use super::*;
     use crate::paper::case::{Case, Loads};
+    use crate::paper::claims::{FALLS, RISES, goes};
     use crate::paper::experiment::Run;
 
     proptest! {
@@ -183,9 +167,10 @@ mod tests {
     fn equal_rigs_have_equal_means() {
         let found = means(&sweep(|_, x| 2.0 + 0.1 * x - 0.004 * x * x));
         assert!(found.spread() < 1e-12);
-        assert!((found.rise() - (0.5 - 0.004 * 55.0)).abs() < 1e-9);
-        assert!(found.all_go(1.0) && !found.all_go(-1.0));
-        assert!(found.bends().iter().all(|&bend| bend > 0.05));
+        let middle = found.middle();
+        assert!((middle[10] - middle[0] - (0.5 - 0.004 * 55.0)).abs() < 1e-9);
+        assert!(found.curves.iter().all(|curve| goes(curve, RISES) && !goes(curve, FALLS)));
+        assert!(found.curves.iter().all(|curve| bend(curve) > 0.05));
         assert_eq!(found.series().len(), 4);
     }
 
@@ -193,7 +178,7 @@ mod tests {
     fn the_spread_is_that_of_the_means() {
         let found = means(&sweep(|rig, x| x + if rig == 0 { 1.0 } else { 0.0 }));
         assert!((found.spread() - 0.1).abs() < 1e-9, "{}", found.spread());
-        assert!(found.bends().iter().all(|bend| bend.abs() < 1e-9));
+        assert!(found.curves.iter().all(|curve| bend(curve).abs() < 1e-9));
         let widest = found.range.iter().map(|(a, b)| b - a).fold(0.0, f64::max);
         assert!((widest - 1.0).abs() < 1e-9);
     }

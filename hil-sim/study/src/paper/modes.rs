@@ -1,10 +1,11 @@
 //! Figure 19: modes of the drive arm.
 
+use interstage::rig::Rig;
+
+use super::claims::{row, table};
 use super::published::{CONSTRAINED_HZ, FREE_HZ};
 use crate::figure::{Chart, Claim, Figure, Mark, Series, Source};
 use crate::reference::beam::{Beam, BeamError, Ends, Shape, Tip};
-
-const SECTION: &str = "Experiment scheme";
 
 /// Points of a mode shape.
 const POINTS: usize = 60;
@@ -116,42 +117,34 @@ impl Modes {
         let length = self.beam.length_m * 1e3;
         values.iter().enumerate().map(|(i, w)| (along(i) * length, w / most)).collect()
     }
+}
 
-    /// The claims about it; `ripple_hz` excites the arm between these speeds of the study.
-    pub fn claims(&self, ripple_hz: (f64, f64)) -> Vec<Claim> {
-        let of = |id| Claim::of("fig19", SECTION, id);
-        let (constrained, free) = (self.constrained[1].1, self.free[1].1);
-        let near = |hz: f64, published: f64| (hz / published - 1.0).abs() < NEAR;
-        let apart = ripple_hz.1 < 0.8 * FREE_HZ.min(CONSTRAINED_HZ);
-        vec![
-            of("first-constrained-276").fitted().judged(
-                "The first constrained mode is 276 Hz.",
-                near(constrained, CONSTRAINED_HZ),
-                format!(
-                    "{:.1} Hz with {:.1} g at the wheel's end, a mass that is fitted to it and represents \
-                     wheel, axle and what yields in the clamp; {:.1} Hz without.",
-                    constrained, self.tip_mass_kg * 1e3, self.bare_hz.0
-                ),
-            ),
-            of("seventh-free-163").explained(
-                "The seventh free mode is 163 Hz.",
-                near(free, FREE_HZ) || near(self.bare_hz.1, FREE_HZ),
-                format!("{free:.0} Hz with the mass at the wheel's end, {:.0} Hz without.", self.bare_hz.1),
-                "The arm alone is far too stiff for it. The published mode is that of the entire device, \
-                 whose masses and joints the study does not give; a free body softer than the clamped arm \
-                 bends somewhere else.",
-            ),
-            of("no-coupling").judged(
-                "The design introduces no coupling: the excitation keeps away from the modes.",
-                apart,
-                format!(
-                    "The drive's torque ripple excites with {:.0} to {:.0} Hz at the study's 3 to 8 mm/s, \
-                     below {FREE_HZ} Hz.",
-                    ripple_hz.0, ripple_hz.1
-                ),
-            ),
-        ]
-    }
+/// The claims about it.
+#[rustfmt::skip]
+pub fn claims(modes: &Modes) -> Vec<Claim> {
+    let (constrained, free) = (modes.constrained[1].1, modes.free[1].1);
+    let mass_g = modes.tip_mass_kg * 1e3;
+    let bare = modes.bare_hz;
+    let near = |hz: f64, published: f64| (hz / published - 1.0).abs() < NEAR;
+    // The torque ripple at the study's slowest and fastest.
+    let [least, most] = [3.0, 8.0].map(|speed| speed / Rig::prototype().drive.ripple_pitch_mm);
+    table("fig19", "Experiment scheme", [
+        row("first-constrained-276", (near(constrained, CONSTRAINED_HZ), format!(
+                "{constrained:.1} Hz with {mass_g:.1} g at the wheel's end, a mass that is fitted \
+                 to it and represents wheel, axle and what yields in the clamp; {:.1} Hz \
+                 without.", bare.0)),
+            "The first constrained mode is 276 Hz.", "").fitted(),
+        row("seventh-free-163", (near(free, FREE_HZ) || near(bare.1, FREE_HZ), format!(
+                "{free:.0} Hz with the mass at the wheel's end, {:.0} Hz without.", bare.1)),
+            "The seventh free mode is 163 Hz.",
+            "The arm alone is far too stiff for it. The published mode is that of the entire \
+             device, whose masses and joints the study does not give; a free body softer than the \
+             clamped arm bends somewhere else."),
+        row("no-coupling", (most < 0.8 * FREE_HZ.min(CONSTRAINED_HZ), format!(
+                "The drive's torque ripple excites with {least:.0} to {most:.0} Hz at the study's \
+                 3 to 8 mm/s, below {FREE_HZ} Hz.")),
+            "The design introduces no coupling: the excitation keeps away from the modes.", ""),
+    ])
 }
 
 /// Frequency equation of a beam clamped at one end with a point mass, in beam masses, at

@@ -34,8 +34,8 @@ pub const LOG_S: f64 = 0.1;
 
 /// Largest difference between the four means: of the gap against preload and against
 /// speed, mm.
-pub const GAP_SPREAD_MM: (f64, f64) = (0.24, 0.32);
+pub const GAP_SPREAD_MM: [f64; 2] = [0.24, 0.32];
 /// Of the embedding depth against preload and against speed, mm.
-pub const DEPTH_SPREAD_MM: (f64, f64) = (0.18, 0.21);
+pub const DEPTH_SPREAD_MM: [f64; 2] = [0.18, 0.21];
 /// Of the contact area against preload and against speed, mm^2.
-pub const AREA_SPREAD_MM2: (f64, f64) = (2.04, 2.71);
+pub const AREA_SPREAD_MM2: [f64; 2] = [2.04, 2.71];

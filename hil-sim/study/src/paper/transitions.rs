@@ -1,8 +1,10 @@
 //! Figure 24: collision, impact and vibration over the three transitions at rig loads.
 
+use std::ops::RangeInclusive;
+
 use super::case::{Case, Loads};
-use super::experiment::STAGES;
-use super::histories::Quantity;
+use super::claims::{BySource, Column, Data, FALLS, RISES, goes, largest, row, table, within};
+use super::histories::Quantity::{self, Collision, Impact, Vibration};
 use super::histories::{Histories, panels};
 use crate::figure::{Claim, Figure, SOURCES, Source};
 
@@ -10,17 +12,18 @@ use crate::figure::{Claim, Figure, SOURCES, Source};
 /// it names. Its own table of them is not published.
 pub const CASES: [(f64, f64); 4] = [(5.0, 33.3), (5.0, 40.0), (8.0, 33.3), (3.0, 40.0)];
 
-const SECTION: &str = "Analysis and discussion of test results";
+/// The collision of the first transition.
+const FIRST: Column = Column::Peak(Collision, 0);
 
 /// Time of the first collision in the study, s.
 const FIRST_BEFORE_S: f64 = 2.0;
 
 /// Time that the study's figure allows for a peak "at 2 s", s: plus or minus its log's
 /// interval.
-const AT_2_S: (f64, f64) = (1.9, 2.1);
+const AT_2_S: RangeInclusive<f64> = 1.9..=2.1;
 
-pub fn cases() -> Vec<Case> {
-    CASES.map(|(speed, preload)| Case::new(Loads::Prototype, speed, preload)).to_vec()
+pub fn cases() -> [Case; 4] {
+    CASES.map(|(speed, preload)| Case::new(Loads::Prototype, speed, preload))
 }
 
 pub fn figure(all: &[Histories]) -> Figure {
@@ -37,185 +40,105 @@ pub fn figure(all: &[Histories]) -> Figure {
     Figure::new("fig24", title, caption, CASES.len(), panels(all))
 }
 
-/// The peaks of the stages as text.
-pub(super) fn peaks_text(one: &Histories, quantity: Quantity) -> String {
-    let of = |source| {
-        let peaks = one.peaks(quantity, source).map(|peak| format!("{:.1}", peak.value));
-        peaks.join(", ")
+/// The claims about it.
+#[rustfmt::skip]
+pub fn claims(data: &Data) -> Vec<Claim> {
+    let all = data.histories(cases());
+    let [_, _, fast, _] = all;
+    let least = |of: &dyn Fn(&Histories) -> f64| all.map(of).into_iter().fold(1.0, f64::min);
+    let shapes = Quantity::ALL.map(|quantity| least(&|one| likeness(one, quantity)));
+    let falls = |quantity: Quantity| {
+        let peaks = all.map(|one| one.peak_values(quantity));
+        let texts = cases().map(|case| data.peaks_text(quantity, case)).join(". ");
+        let found = format!(
+            "By stage, {} (theory; simulation; virtual rig). {texts}. Of what makes the stages \
+             differ there is the inclination of the arm alone: its thrust on the wheel falls by a \
+             few per cent from sleeve to sleeve.",
+            quantity.axis()
+        );
+        (peaks.iter().flatten().all(|by_stage| goes(by_stage, FALLS)), found)
     };
-    let [theory, simulation, experiment] = SOURCES.map(of);
-    format!("{}: {theory}; {simulation}; {experiment}", one.case.name())
-}
-
-/// Whether the peaks fall from stage to stage in every source.
-pub(super) fn fall(one: &Histories, quantity: Quantity) -> bool {
-    SOURCES.into_iter().all(|source| {
-        let peaks = one.peaks(quantity, source);
-        peaks.windows(2).all(|pair| pair[1].value < pair[0].value)
-    })
-}
-
-/// The claims about it; `all` in the order of [`CASES`].
-pub fn claims(all: &[Histories]) -> Vec<Claim> {
-    let of = |id| Claim::of("fig24", SECTION, id);
-    let shapes = Quantity::ALL.map(|quantity| {
-        all.iter().map(|one| likeness(one, quantity)).fold(f64::INFINITY, f64::min)
+    let following = [Impact, Vibration].map(|quantity| least(&|one| following(one, quantity)));
+    let left: [f64; 3] = std::array::from_fn(|source| {
+        let over = |one: &Histories| Quantity::ALL.map(|quantity| one.left_over(quantity)[source]);
+        largest(all.into_iter().flat_map(over))
     });
-    let fast = &all[2];
-    let first = |quantity| SOURCES.map(|source| fast.peaks(quantity, source)[0].time_s);
-    let falls = |quantity| all.iter().all(|one| fall(one, quantity));
-    let texts = |quantity: Quantity| {
-        let all: Vec<String> = all.iter().map(|one| peaks_text(one, quantity)).collect();
-        format!(
-            "By stage, {} (theory; simulation; virtual rig). {}. Of what makes the stages differ there is \
-             the inclination of the arm alone: its thrust on the wheel falls by a few per cent from sleeve to sleeve.",
-            quantity.axis(),
-            all.join(". ")
-        )
+    let peaks = fast.peak_values(Collision);
+    let first_highest = peaks.iter().all(|by_stage| largest(*by_stage) <= by_stage[0]);
+    let [collided, hit, shaken] = Quantity::ALL
+        .map(|quantity| SOURCES.map(|source| fast.peaks(quantity, source)[0].time_s));
+    let seconds = |times: BySource| times.map(|t| format!("{t:.2}")).join(", ");
+    let until = fast.first_passed_s + 0.25;
+    let humps = SOURCES.map(|source| {
+        let first = fast.points(Vibration, source).iter().take_while(|p| p.0 <= until);
+        count_humps(first.map(|p| p.1), 0.05)
+    });
+    let pairs = |related: fn(&Case, &Case) -> bool, sense| {
+        let pairs = cases().into_iter().flat_map(|a| cases().map(|b| [a, b]));
+        let pairs: Vec<[Case; 2]> = pairs.filter(|[a, b]| related(a, b)).collect();
+        let text = |&[a, b]: &[Case; 2]| {
+            format!("{} to {}: {}", a.name(), b.name(), data.span(FIRST, [a, b], 1, "N"))
+        };
+        let texts = pairs.iter().map(text).collect::<Vec<_>>().join("; ");
+        let found = format!("{texts} (theory, simulation, virtual rig).");
+        (pairs.iter().all(|&pair| data.goes(FIRST, pair, sense)), found)
     };
-    let left = SOURCES.map(|source| {
-        let over = |one: &Histories| Quantity::ALL.map(|quantity| one.left_over(quantity, source));
-        all.iter().flat_map(over).fold(0.0, f64::max)
-    });
-    let [collided, hit, shaken] = Quantity::ALL.map(first);
-    let seconds = |times: [f64; 3]| times.map(|t| format!("{t:.2}")).join(", ");
-    let humps = SOURCES.map(|source| humps(fast, Quantity::Vibration, source));
-    let faster = all_pairs(all, |a, b| a.preload_n == b.preload_n && a.speed_mm_s < b.speed_mm_s);
-    let pressed = all_pairs(all, |a, b| a.speed_mm_s == b.speed_mm_s && a.preload_n < b.preload_n);
-    vec![
-        of("three-sources-agree").fitted().explained(
-            "Collision, impact and vibration show the same trends in theory, simulation and \
-             virtual rig.",
-            shapes.iter().all(|&shape| shape > 0.9),
-            format!(
+    table("fig24", "Analysis and discussion of test results", [
+        row("three-sources-agree", (shapes.iter().all(|&shape| shape > 0.9), format!(
                 "Least correlation of simulation and virtual rig at the log's times with theory \
                  over the four cases: collision {:.3}, impact {:.3}, vibration {:.3}.",
-                shapes[0], shapes[1], shapes[2]
-            ),
-            "The pulses are the same; they lie by up to 0.2 s apart, as each rig's steps do.",
-        ),
-        of("collision-peaks-fall").judged(
-            "The peaks of the collision fall from the first transition to the third.",
-            falls(Quantity::Collision),
-            texts(Quantity::Collision),
-        ),
-        of("impact-peaks-fall").explained(
+                shapes[0], shapes[1], shapes[2])),
+            "Collision, impact and vibration show the same trends in theory, simulation and \
+             virtual rig.",
+            "The pulses are the same; they lie by up to 0.2 s apart, as each rig's steps \
+             do.").fitted(),
+        row("collision-peaks-fall", falls(Collision),
+            "The peaks of the collision fall from the first transition to the third.", ""),
+        row("impact-peaks-fall", falls(Impact),
             "The peaks of the impact fall from the first transition to the third.",
-            falls(Quantity::Impact),
-            texts(Quantity::Impact),
-            "They differ by a per cent or two, which is what a log of 0.1 s leaves of a peak.",
-        ),
-        of("vibration-peaks-fall").judged(
-            "The peaks of the vibration fall from the first transition to the third.",
-            falls(Quantity::Vibration),
-            texts(Quantity::Vibration),
-        ),
-        of("impact-and-vibration-fall-with-collision").judged(
-            "Impact and vibration diminish as the collision does.",
-            all.iter().all(|one| follows(one, Quantity::Impact) && follows(one, Quantity::Vibration)),
-            format!(
+            "They differ by a per cent or two, which is what a log of 0.1 s leaves of a peak."),
+        row("vibration-peaks-fall", falls(Vibration),
+            "The peaks of the vibration fall from the first transition to the third.", ""),
+        row("impact-and-vibration-fall-with-collision",
+            (following.iter().all(|&least| least > 0.7), format!(
                 "Least correlation with the collision within a source: impact {:.2}, vibration \
                  {:.2}.",
-                least_following(all, Quantity::Impact),
-                least_following(all, Quantity::Vibration)
-            ),
-        ),
-        of("nothing-after-the-third").judged(
-            "After the third transition the values approach zero: contact is smooth.",
-            left.iter().all(|&part| part < 0.05),
-            format!(
-                "Largest value after it, beyond that before the first, over the largest of all: theory \
-                 {:.3}, simulation {:.3}, virtual rig {:.3}. What is there before and after is the \
-                 drive's torque ripple, which shakes the arm between the steps as well.",
-                left[0], left[1], left[2]
-            ),
-        ),
-        of("collision-before-2-s").judged(
-            "The largest collision comes in the first transition, before 2 s.",
-            collided.iter().all(|&t| t < FIRST_BEFORE_S) && highest_first(fast, Quantity::Collision),
-            format!("At 8 mm/s, 33.3 N: {} s (theory, simulation, virtual rig).", seconds(collided)),
-        ),
-        of("impact-at-2-s").explained(
-            "The impact peaks at 2 s, after the collision, held up by the tread's deformation.",
-            hit.iter().all(|&t| (AT_2_S.0..=AT_2_S.1).contains(&t))
-                && hit.iter().zip(&collided).all(|(hit, collided)| hit > collided),
-            format!(
+                following[0], following[1])),
+            "Impact and vibration diminish as the collision does.", ""),
+        row("nothing-after-the-third", (within(left, 0.05), format!(
+                "Largest value after it, beyond that before the first, over the largest of all: \
+                 theory {:.3}, simulation {:.3}, virtual rig {:.3}. What is there before and after \
+                 is the drive's torque ripple, which shakes the arm between the steps as well.",
+                left[0], left[1], left[2])),
+            "After the third transition the values approach zero: contact is smooth.", ""),
+        row("collision-before-2-s", (largest(collided) < FIRST_BEFORE_S && first_highest, format!(
+                "At 8 mm/s, 33.3 N: {} s (theory, simulation, virtual rig).", seconds(collided))),
+            "The largest collision comes in the first transition, before 2 s.", ""),
+        row("impact-at-2-s",
+            (hit.iter().zip(collided).all(|(t, before)| AT_2_S.contains(t) && *t > before), format!(
                 "At 8 mm/s, 33.3 N: {} s, against {} s of the collision (theory, simulation, \
-                 virtual rig).",
-                seconds(hit),
-                seconds(collided)
-            ),
-            "The stress peaks no later than the force: the corner then presses on a narrow part of the tread. A \
-             stress wave crosses the tread in about 0.1 ms: it cannot hold anything up by tenths of \
-             a second.",
-        ),
-        of("vibration-peaks-twice").explained(
-            "The vibration peaks before 2 s and again after it.",
-            humps.iter().all(|&count| count >= 2),
-            format!(
+                 virtual rig).", seconds(hit), seconds(collided))),
+            "The impact peaks at 2 s, after the collision, held up by the tread's deformation.",
+            "The stress peaks no later than the force: the corner then presses on a narrow part of \
+             the tread. A stress wave crosses the tread in about 0.1 ms: it cannot hold anything \
+             up by tenths of a second."),
+        row("vibration-peaks-twice", (humps.iter().all(|&count| count >= 2), format!(
                 "Peaks of the first transition at 8 mm/s, 33.3 N: {}, {}, {} (theory, simulation, \
-                 virtual rig), at {} s.",
-                humps[0],
-                humps[1],
-                humps[2],
-                seconds(shaken)
-            ),
+                 virtual rig), at {} s.", humps[0], humps[1], humps[2], seconds(shaken))),
+            "The vibration peaks before 2 s and again after it.",
             "The arm follows the collision within milliseconds (its first mode is 276 Hz) and has \
-             one peak with it; no second one arises from stress waves.",
-        ),
-        of("collision-grows-with-speed-rig").judged(
-            "Within one sleeve and at the same preload, a faster wheel meets a larger collision.",
-            faster.iter().all(|(a, b)| first_rises(a, b, Quantity::Collision, 1.0)),
-            pairs_text(&faster),
-        ),
-        of("collision-falls-with-preload-rig").explained(
+             one peak with it; no second one arises from stress waves."),
+        row("collision-grows-with-speed-rig",
+            pairs(|a, b| a.preload_n == b.preload_n && a.speed_mm_s < b.speed_mm_s, RISES),
+            "Within one sleeve and at the same preload, a faster wheel meets a larger \
+             collision.", ""),
+        row("collision-falls-with-preload-rig",
+            pairs(|a, b| a.speed_mm_s == b.speed_mm_s && a.preload_n < b.preload_n, FALLS),
             "Within one sleeve and at the same speed, more preload makes for a smaller collision.",
-            pressed.iter().all(|(a, b)| first_rises(a, b, Quantity::Collision, -1.0)),
-            pairs_text(&pressed),
-            "It makes for a larger one: the wheel climbs with the force that presses it, P tan of the \
-             angle at which the corner bears; the smaller gap turns that angle down by less than the \
-             force grows.",
-        ),
-    ]
-}
-
-type Pair<'a> = (&'a Histories, &'a Histories);
-
-fn all_pairs(all: &[Histories], related: impl Fn(&Case, &Case) -> bool) -> Vec<Pair<'_>> {
-    let pairs = all.iter().flat_map(|a| all.iter().map(move |b| (a, b)));
-    pairs.filter(|(a, b)| related(&a.case, &b.case)).collect()
-}
-
-/// Whether the first peak rises (falls) from one case to another in every source.
-pub(super) fn first_rises(a: &Histories, b: &Histories, quantity: Quantity, sense: f64) -> bool {
-    let firsts = a.stage(quantity, 0).into_iter().zip(b.stage(quantity, 0));
-    firsts.into_iter().all(|(a, b)| sense * (b - a) > 0.0)
-}
-
-fn pairs_text(pairs: &[Pair]) -> String {
-    let text = |(a, b): &Pair| {
-        let [first_a, first_b] = [a, b].map(|one| one.stage(Quantity::Collision, 0));
-        let change = |(a, b)| format!("{a:.1} to {b:.1} N");
-        let changes: Vec<String> = first_a.into_iter().zip(first_b).map(change).collect();
-        format!("{} to {}: {}", a.case.name(), b.case.name(), changes.join(", "))
-    };
-    let all: Vec<String> = pairs.iter().map(text).collect();
-    format!("{} (theory, simulation, virtual rig).", all.join("; "))
-}
-
-/// Whether the highest peak is that of the first stage, in every source.
-fn highest_first(one: &Histories, quantity: Quantity) -> bool {
-    let first = one.stage(quantity, 0);
-    (1..STAGES)
-        .all(|n| one.stage(quantity, n).iter().zip(first).all(|(peak, first)| *peak <= first))
-}
-
-/// Local maxima of the first transition that exceed both neighbouring minima by a
-/// twentieth of its peak.
-fn humps(one: &Histories, quantity: Quantity, source: Source) -> usize {
-    let until = one.first_passed_s + 0.25;
-    let points = one.points(quantity, source);
-    count_humps(points.iter().take_while(|p| p.0 <= until).map(|p| p.1), 0.05)
+            "It makes for a larger one: the wheel climbs with the force that presses it, P tan of \
+             the angle at which the corner bears; the smaller gap turns that angle down by less \
+             than the force grows."),
+    ])
 }
 
 /// Local maxima that exceed the minima before and after them by this part of the largest
@@ -243,29 +166,20 @@ pub(super) fn count_humps(values: impl Iterator<Item = f64> + Clone, part: f64) 
 fn likeness(one: &Histories, quantity: Quantity) -> f64 {
     let theory = one.points(quantity, Source::Theory);
     let against = |source| {
-        let other = one.points(quantity, source);
-        let pairs: Vec<(f64, f64)> =
-            other.iter().filter_map(|&(t, y)| Some((y, at(&theory, t)?))).collect();
-        correlation(&pairs)
+        let points = one.points(quantity, source).iter();
+        let pairs = points.filter_map(|&(t, y)| Some((y, at(theory, t)?)));
+        correlation(&pairs.collect::<Vec<_>>())
     };
     against(Source::Simulation).min(against(Source::Experiment))
 }
 
-fn following(one: &Histories, quantity: Quantity, source: Source) -> f64 {
-    let collision = one.points(Quantity::Collision, source);
-    let other = one.points(quantity, source);
-    correlation(&collision.iter().zip(&other).map(|(a, b)| (a.1, b.1)).collect::<Vec<_>>())
-}
-
-fn follows(one: &Histories, quantity: Quantity) -> bool {
-    SOURCES.into_iter().all(|source| following(one, quantity, source) > 0.7)
-}
-
-fn least_following(all: &[Histories], quantity: Quantity) -> f64 {
-    let of = |one: &Histories| {
-        SOURCES.map(|source| following(one, quantity, source)).into_iter().fold(1.0, f64::min)
+/// Least correlation with the collision within a source.
+fn following(one: &Histories, quantity: Quantity) -> f64 {
+    let within = |source| {
+        let pairs = one.points(Collision, source).iter().zip(one.points(quantity, source));
+        correlation(&pairs.map(|(a, b)| (a.1, b.1)).collect::<Vec<_>>())
     };
-    all.iter().map(of).fold(1.0, f64::min)
+    SOURCES.map(within).into_iter().fold(1.0, f64::min)
 }
 
 /// Value at a time, linear between points; none outside.
