@@ -85,6 +85,11 @@ pub trait RunningRig {
     /// Mode of the controller.
     fn mode(&self) -> Mode;
 
+    /// Whether an operator may give a command.
+    fn is_free(&self) -> bool {
+        true
+    }
+
     /// Time since boot, s.
     fn time_s(&self) -> f64;
 
@@ -108,20 +113,10 @@ pub fn run(scenario: &Scenario, options: Options) -> Result<Recording, RunError>
 pub fn run_session(mut session: Session, scenario: &Scenario) -> Result<Recording, RunError> {
     let (mut start, longest_s) = (Some(starter(scenario.run.direction)), longest_s(&scenario.rig));
     let started = Instant::now();
-    while tick(&mut session, &mut start, longest_s)?.is_some() {}
-    Ok(session.finish(started.elapsed().as_secs_f64()))
-}
-
-/// A tick of a run that gets `start` as soon as the drive is idle; none at its end.
-fn tick(
-    session: &mut Session,
-    start: &mut Option<Command>,
-    longest_s: f64,
-) -> Result<Option<Output>, RunError> {
-    let over = matches!(session.mode(), Mode::Complete(_) | Mode::FaultHold(_));
-    if over || session.time_s() >= longest_s {
-        return Ok(None);
+    let over = |mode| matches!(mode, Mode::Complete(_) | Mode::FaultHold(_));
+    while !over(session.mode()) && session.time_s() < longest_s {
+        let command = if session.mode() == Mode::Idle { start.take() } else { None };
+        session.step(command)?;
     }
-    let command = if session.mode() == Mode::Idle { start.take() } else { None };
-    session.step(command).map(Some)
+    Ok(session.finish(started.elapsed().as_secs_f64()))
 }

@@ -16,7 +16,7 @@ use hil_sim::injector::{FaultInjector, FaultTimes};
 use hil_sim::plant::draw::PlantParameters;
 use hil_sim::plant::rig::{Drives, VirtualRig};
 use hil_sim::plant::sensors::{Codes, Sensors};
-use hil_sim::record::{letter, starter};
+use hil_sim::record::letter;
 use hil_sim::scenario::{Direction, Scenario};
 use hil_sim::session;
 use interstage::sense::raw::{EncoderCount, SensorId};
@@ -61,12 +61,6 @@ pub struct Bench<'a> {
     injector: Option<BoardInjector>,
     /// Between the pins and the plant; [`Bench::connect`] applies a change of it.
     pub wiring: Wiring,
-    /// The letter that starts the drive.
-    start: u8,
-    /// The command to start is still to be sent, as soon as the drive is idle.
-    pub starts: bool,
-    /// The log has reported idle.
-    idle: bool,
 }
 
 impl<'a> Bench<'a> {
@@ -109,9 +103,6 @@ impl<'a> Bench<'a> {
             injector: FaultInjector::of(scenario)
                 .map(|faults| BoardInjector::new(faults, scenario)),
             wiring,
-            start: letter(starter(scenario.run.direction)),
-            starts: false,
-            idle: false,
         };
         bench.connect();
         bench.set_sensors(codes);
@@ -211,12 +202,7 @@ impl<'a> Bench<'a> {
             frames.extend(self.probe.up(&mut self.machine, 1)?);
         }
         let bytes = self.probe.up(&mut self.machine, 0)?;
-        let lines = self.reader.read(&bytes);
-        self.idle |= lines.iter().any(|line| line.text.contains("mode: idle"));
-        if self.starts && self.idle {
-            self.starts = !self.send(self.start)?;
-        }
-        Ok((passed, lines))
+        Ok((passed, self.reader.read(&bytes)))
     }
 
     /// Mean commands at the bridges since the last call.

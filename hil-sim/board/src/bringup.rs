@@ -8,7 +8,7 @@ use hil_sim::bringup::{Action, BringupError, Operator, Question, Seen};
 use hil_sim::probe::{Port, PortError};
 
 use super::bench::Bench;
-use super::port::{Usb, gone};
+use super::port::gone;
 
 /// Travel of the tread that an eye sees, mm.
 const SEEN_MM: f64 = 0.5;
@@ -18,33 +18,13 @@ const RESET_MS: u32 = 300;
 /// A bench with a probe at its board and a person beside it.
 pub struct Attended<'a> {
     bench: Rc<RefCell<Bench<'a>>>,
-    /// The probe's accesses take time.
-    usb: Option<Usb>,
-    /// Time that they took and that has not passed at the bench, us.
-    owed: u64,
 }
 
 impl<'a> Attended<'a> {
     /// This bench, its motor supply switched off.
     pub fn new(mut bench: Bench<'a>) -> Self {
         bench.wiring.switched_off = true;
-        Self { bench: Rc::new(RefCell::new(bench)), usb: None, owed: 0 }
-    }
-
-    /// The same with a probe on USB; otherwise an access takes no time.
-    pub fn on_usb(self) -> Self {
-        Self { usb: Some(Usb::default()), ..self }
-    }
-
-    /// Lets the time of so many accesses pass.
-    fn access(&mut self, accesses: u32) -> Result<(), PortError> {
-        let Some(usb) = &mut self.usb else { return Ok(()) };
-        self.owed += (0..accesses).map(|_| usb.access_us()).sum::<u64>();
-        while self.owed >= 1000 {
-            self.owed -= 1000;
-            self.bench.borrow_mut().pass()?;
-        }
-        Ok(())
+        Self { bench: Rc::new(RefCell::new(bench)) }
     }
 
     /// The person, whose motions `asked` allows.
@@ -61,12 +41,10 @@ fn tread_mm(bench: &Bench<'_>) -> f64 {
 
 impl Port for Attended<'_> {
     fn up(&mut self, channel: u32) -> Result<Vec<u8>, PortError> {
-        self.access(3)?;
         self.bench.borrow_mut().up(channel)
     }
 
     fn down(&mut self, channel: u32, bytes: &[u8]) -> Result<usize, PortError> {
-        self.access(4)?;
         self.bench.borrow_mut().down(channel, bytes)
     }
 
@@ -75,7 +53,6 @@ impl Port for Attended<'_> {
     }
 
     fn memory(&mut self, address: u32, into: &mut [u8]) -> Result<(), PortError> {
-        self.access(1)?;
         self.bench.borrow_mut().memory(address, into)
     }
 

@@ -22,8 +22,8 @@ use crate::fault_injector::Saving;
 use crate::log::Strings;
 use crate::peripherals::rcc::Cause;
 use crate::run::store;
-use hil_sim::faults::campaign::{AFTER_S, Instant, Operator, Twin, crossed, doing, longest_s};
-use hil_sim::faults::judge::{Finding, Judge};
+use hil_sim::faults::campaign::{AFTER_S, Instant, Trial, Twin};
+use hil_sim::faults::judge::Finding;
 use hil_sim::faults::sets;
 use hil_sim::injector::FaultTimes;
 use hil_sim::params::set_of;
@@ -203,6 +203,11 @@ impl RunningRig for Board<'_> {
         self.mode
     }
 
+    /// During a save of parameters the operator gives no command.
+    fn is_free(&self) -> bool {
+        self.bench.saving() != Some(Saving::Writing)
+    }
+
     fn time_s(&self) -> f64 {
         self.bench.time_s()
     }
@@ -232,89 +237,59 @@ pub fn watched(
     twin: &Twin,
 ) -> Result<Instant, BoardError> {
     let mut board = Board::new(firmware, scenario)?;
-    let mut judge = Judge::new(scenario, board.plant().truth());
-    let mut operator = Operator::default();
-    let reset = scenario.run.faults.first().is_some_and(Injection::resets_board);
+    let injection = scenario.run.faults.first();
+    let reset = injection.is_some_and(Injection::resets_board);
     let mut hold = reset.then(|| store_kept(&mut board, scenario)).transpose()?;
-    let early = scenario.run.faults.is_empty();
     // One wrong bit is corrected by the chip.
     let damages = |f: &Injection| f.target == Target::Image && f.kind != Kind::OneWrongBit;
     let of_image = scenario.run.faults.iter().any(damages);
-    let (mut during, mut after_s) = (None, 0.0);
-    let (mut worst_mm, mut back_s) = (0.0f64, None);
-    let longest_s = longest_s(&scenario.rig);
-    while board.time_s() < longest_s && after_s < AFTER_S {
-        let t_s = board.time_s();
-        let before = board.mode;
-        // During a save of parameters the operator gives no command.
-        let free = board.bench.saving() != Some(Saving::Writing);
-        let command = if free { operator.command(before) } else { None };
-        let output = board.step(command)?;
+    let mut back_s = None;
+    let trial = Trial::run(&mut board, scenario, twin, AFTER_S, |board, t_s, command, over| {
         if let Some(hold) = &mut hold {
-            hold.look(&board, command);
+            hold.look(board, command);
         }
-        let struck = early || board.fault_times().struck_s.is_some();
-        if struck && !early && during.is_none() {
-            during = Some(doing(before));
-        }
-        let truth = board.plant().truth();
-        judge.look(t_s, &output, truth, struck);
-        if board.mode.moves() {
-            worst_mm = worst_mm.max(truth.separation_mm);
-        }
-        if board.restarts > 0 && back_s.is_none() {
-            back_s = Some(t_s);
+        if board.restarts > 0 {
+            back_s.get_or_insert(t_s);
         }
         // Only a save in progress delays the end of the run.
         let saves = matches!(board.bench.saving(), Some(Saving::Requested | Saving::Writing));
-        let over = match (board.image_s, board.light_s) {
+        match (board.image_s, board.light_s) {
             (Some(_), _) => true,
             // The log's line can still follow.
             (None, Some(light_s)) => t_s > light_s + LIGHT_TO_LOG_S,
             // The check of the image takes some seconds.
             (None, None) if of_image => false,
-            (None, None) => !saves && (operator.over(board.mode) || board.parameters.holds()),
-        };
-        after_s = if over { after_s + 1e-3 } else { 0.0 };
-    }
-    let (gap_part, crossed) = crossed(&board.bench.plant, twin, worst_mm);
-    if scenario.run.faults.first().is_some_and(|fault| fault.target.is_of_start()) {
-        return parameters::judged(board, judge, scenario, twin, (gap_part, crossed));
+            (None, None) => !saves && (over || board.parameters.holds()),
+        }
+    })?;
+    if injection.is_some_and(|fault| fault.target.is_of_start()) {
+        return parameters::judged(board, trial, scenario);
     }
     let restart = match (board.image_s, board.light_s) {
         (Some(_), _) => Some(IMAGE_DAMAGED),
         (None, Some(_)) => Some(IMAGE_LIGHT),
         (None, None) => board.restart().filter(|_| !of_image),
     };
-    let finding = match (judge.finding(&twin.limits, gap_part, crossed), board.restarts) {
-        (finding, 0) if !of_image => finding,
-        _ if restart.is_some() => Finding::Found,
-        _ => Finding::Undetected,
-    };
-    let report = judge.report(&twin.limits);
-    let times = board.fault_times();
-    let reported_s = match report {
+    let reported_s = match trial.report() {
         Some((at_s, _)) => Some(at_s),
         None => board.image_s.or(board.light_s).or(back_s).filter(|_| restart.is_some()),
     };
-    let since = |from_s: Option<f64>| Some(1e3 * (reported_s? - from_s?).max(0.0));
+    let mut found = trial.found(reported_s);
     let (around, unrecorded) = match hold {
         Some(hold) => hold.judged(&mut board, scenario)?,
         None => (Vec::new(), None),
     };
-    let finding = if unrecorded.is_some() { Finding::Undetected } else { finding };
-    let harms = judge.harms().into_iter().chain(around).chain(unrecorded).collect();
-    let judged = Instant::judged(scenario, &judge, twin, gap_part);
-    Ok(Instant {
-        at_s: times.struck_s,
-        during: during.unwrap_or("at rest").into(),
-        finding,
-        restart: restart.map(Into::into),
-        latency_ms: since(times.shows_s).or(since(times.acts_s).map(|_| 0.0)),
-        end: if board.image_s.is_some() { "hold".into() } else { judged.end },
-        harms,
-        ..judged
-    })
+    found.finding = match board.restarts {
+        _ if unrecorded.is_some() => Finding::Undetected,
+        0 if !of_image => found.finding,
+        _ if restart.is_some() => Finding::Found,
+        _ => Finding::Undetected,
+    };
+    if board.image_s.is_some() {
+        found.end = "hold".into();
+    }
+    found.harms.extend(around.into_iter().chain(unrecorded));
+    Ok(Instant { restart: restart.map(Into::into), ..found })
 }
 
 /// Stores the rig's parameters in the board's flash, which the reset must not change.

@@ -12,21 +12,17 @@ mod save;
 
 use interstage::sense::raw::{SensorFrame, SensorId};
 
-use super::chip::map::PARAMETER_SETS;
 use super::core::CoreError;
-use super::elf::FLASH;
-use super::faults::Fault;
+use super::faults;
 use super::machine::Machine;
 use super::peripherals::HZ;
-use super::peripherals::flash::{Cut, Wrong};
+use super::peripherals::flash::Cut;
 use hil_sim::faults::sets;
 use hil_sim::injector::{FaultInjector, FaultTimes};
-use hil_sim::params::set_of;
 use hil_sim::plant::rig::VirtualRig;
 use hil_sim::plant::sensors::Codes;
 use hil_sim::scenario::Scenario;
 use hil_sim::scenario::injection::{Injection, Kind, Target};
-use interstage::params::slots::SLOT_BYTES;
 use interstage::rig::Rig;
 
 use save::Save;
@@ -49,7 +45,7 @@ pub(super) struct BoardInjector {
     /// Ticks are being lost.
     losing: bool,
     /// A reset or a halt within the millisecond, after this part of it.
-    within: Option<(Fault, f64)>,
+    within: Option<(Injection, f64)>,
     /// Encoder and angle sensor are silent.
     silent: [bool; 2],
     /// State of the noise on the host's line, while it is flooded.
@@ -90,7 +86,8 @@ impl BoardInjector {
         }
         let losing = self.faults.lost();
         if losing != std::mem::replace(&mut self.losing, losing) {
-            Fault::ButtonStorm.switch(machine, losing)?;
+            let storm = Injection::at(Target::Interrupt, Kind::Flooding, 0.0, 0.0);
+            faults::switch(machine, &storm, losing)?;
         }
         Ok(())
     }
@@ -114,24 +111,16 @@ impl BoardInjector {
             let set = sets::set(sets::SAVED, &self.rig).ok().filter(|_| on);
             self.save = set.map(|set| Save::new(machine, set, cut(injection)));
         }
-        if let Some(bit) = flipped(machine, injection)?.filter(|_| on) {
-            return bit.switch(machine, true);
+        if on && (injection.resets_board() || injection.kind == Kind::Halted) {
+            // At a cycle that depends on the seed.
+            self.within = Some((*injection, (self.seed as f64 * 0.618_034).fract()));
+            return Ok(());
         }
-        match register(injection) {
-            Some(fault) if on && (injection.resets_board() || injection.kind == Kind::Halted) => {
-                // At a cycle that depends on the seed.
-                self.within = Some((fault, (self.seed as f64 * 0.618_034).fract()));
-                Ok(())
-            }
-            Some(fault) => {
-                if fault == Fault::StopShorted {
-                    // The button is pressed, and the short hides it.
-                    Fault::StopTorn.switch(machine, on)?;
-                }
-                fault.switch(machine, on)
-            }
-            None => Ok(()),
+        if (injection.target, injection.kind) == (Target::StopWire, Kind::Shorted) {
+            // The button is pressed, and the short hides it.
+            faults::switch(machine, &Injection { kind: Kind::Off, ..*injection }, on)?;
         }
+        faults::switch(machine, injection, on)
     }
 
     /// Runs the board to a reset or halt, or to the poll of a task that is to hang, `until` this cycle
@@ -144,7 +133,7 @@ impl BoardInjector {
         if let Some((fault, part)) = self.within.take() {
             let now = machine.now();
             machine.run_on(now + (part * until.saturating_sub(now) as f64) as u64)?;
-            fault.switch(machine, true)?;
+            faults::switch(machine, &fault, true)?;
         }
         if let Some(search) = &mut self.search
             && search.run(machine, until)?
@@ -238,59 +227,6 @@ fn cut(injection: &Injection) -> Cut {
         Kind::Reset => Cut::Pulled(operation),
         _ => Cut::Within(operation),
     }
-}
-
-/// The bit of the image or of a parameter set that is wrong; none for another fault, or if
-/// the image has no such set.
-fn flipped(machine: &Machine, injection: &Injection) -> Result<Option<Fault>, CoreError> {
-    let bit = injection.magnitude() as u32;
-    let (place, bit) = match injection.target {
-        Target::StoredSet => (Some(PARAMETER_SETS), bit),
-        Target::SpareSet => (Some(PARAMETER_SETS + SLOT_BYTES as u32), bit),
-        Target::ImageSet => {
-            let set = set_of("prototype", &Rig::prototype()).unwrap_or_default();
-            (machine.find(&set)?, bit % (8 * set.len() as u32).max(1))
-        }
-        Target::Image => {
-            let used = machine.image.flash.iter().rposition(|byte| *byte != 0xFF);
-            (Some(FLASH.base), bit % (8 * used.map_or(1, |last| last as u32 + 1)))
-        }
-        _ => return Ok(None),
-    };
-    Ok(place.map(|place| match injection.kind {
-        Kind::OneWrongBit => Fault::WrongBits(place + bit / 8, Wrong::One),
-        Kind::TwoWrongBits => Fault::WrongBits(place + bit / 8, Wrong::Two),
-        _ => Fault::BitFlip(place + bit / 8, (bit % 8) as u8),
-    }))
-}
-
-/// The fault of registers and lines for an injection.
-fn register(injection: &Injection) -> Option<Fault> {
-    let word = injection.magnitude() as u16;
-    Some(match (injection.target, injection.kind) {
-        (Target::PreloadSensorConverter, _) => Fault::StuckCode(0, word),
-        (Target::TreadConverter, _) => Fault::StuckCode(1, word),
-        (Target::AngleBus, Kind::BitErrors) => Fault::BitErrors(word),
-        (Target::AngleBus, Kind::Disturbed) => Fault::AngleDisturbed,
-        (Target::AngleBus, _) => Fault::AngleLost,
-        (Target::Magnet, _) => Fault::MagnetLost,
-        (Target::StopWire, Kind::Shorted) => Fault::StopShorted,
-        (Target::StopWire, _) => Fault::StopTorn,
-        (Target::OptionBytes, _) => Fault::OneBank,
-        (Target::EncoderLineA, _) => Fault::EncoderLine(0),
-        (Target::EncoderLineB, _) => Fault::EncoderLine(1),
-        (Target::Dma, _) => Fault::DmaStalled,
-        (Target::Timer, _) => Fault::TimerFlags,
-        (Target::Interrupt, _) => Fault::ButtonStorm,
-        (Target::Processor, _) => Fault::Caught,
-        (Target::Supply, Kind::Off) => Fault::BrownOut,
-        (Target::Supply, Kind::Weak) => Fault::SupplyDip,
-        (Target::Supply, _) => Fault::SupplyCut,
-        (Target::ResetPin, _) => Fault::ResetPin,
-        (Target::Debugger, Kind::Halted) => Fault::Halted(word),
-        (Target::Debugger, _) => Fault::Software,
-        _ => return None,
-    })
 }
 
 /// The search for a task's next poll.

@@ -17,50 +17,18 @@ const PERIPHERALS: u32 = 0x4000_0000;
 /// Cycles of a pause between two polls.
 const LOOK: u64 = 4000;
 
-/// How long accesses take over USB.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Usb {
-    accesses: u64,
-}
-
-impl Usb {
-    /// Time of the next access, us: half a millisecond, and an eighth of a second now and then.
-    pub const fn access_us(&mut self) -> u64 {
-        self.accesses += 1;
-        if self.accesses.is_multiple_of(400) { 125_000 } else { 500 }
-    }
-}
-
 /// An emulated board with nothing at its pins.
 pub struct EmulatedPort {
     /// The board.
     pub machine: Machine,
     probe: Probe,
-    /// Its accesses take time.
-    usb: Option<Usb>,
 }
 
 impl EmulatedPort {
     /// A board with this image, before its first instruction.
     pub fn new(elf: &[u8]) -> Result<Self, ImageError> {
         let machine = Machine::new(elf)?;
-        Ok(Self { probe: Probe::of(&machine)?, machine, usb: None })
-    }
-
-    /// The same at a probe on USB; otherwise an access takes no time.
-    pub fn on_usb(self) -> Self {
-        Self { usb: Some(Usb::default()), ..self }
-    }
-
-    /// Lets the time of so many accesses pass.
-    fn access(&mut self, accesses: u32) -> Result<(), PortError> {
-        let Some(usb) = &mut self.usb else { return Ok(()) };
-        let us: u64 = (0..accesses).map(|_| usb.access_us()).sum();
-        self.run(us * (HZ / 1_000_000))
-    }
-
-    fn run(&mut self, cycles: u64) -> Result<(), PortError> {
-        self.machine.run_on(self.machine.now() + cycles).map_err(gone)
+        Ok(Self { probe: Probe::of(&machine)?, machine })
     }
 }
 
@@ -71,15 +39,10 @@ pub(crate) fn gone(error: impl std::fmt::Display) -> PortError {
 
 impl Port for EmulatedPort {
     fn up(&mut self, channel: u32) -> Result<Vec<u8>, PortError> {
-        // The offsets; then data and read offset.
-        self.access(1)?;
-        let bytes = self.probe.up(&mut self.machine, channel).map_err(gone)?;
-        self.access(if bytes.is_empty() { 0 } else { 2 })?;
-        Ok(bytes)
+        self.probe.up(&mut self.machine, channel).map_err(gone)
     }
 
     fn down(&mut self, channel: u32, bytes: &[u8]) -> Result<usize, PortError> {
-        self.access(4)?;
         self.probe.down(&mut self.machine, channel, bytes).map_err(gone)
     }
 
@@ -90,12 +53,11 @@ impl Port for EmulatedPort {
     }
 
     fn memory(&mut self, address: u32, into: &mut [u8]) -> Result<(), PortError> {
-        self.access(1)?;
         self.machine.peek(address, into).map_err(gone)
     }
 
     fn pass(&mut self) -> Result<(), PortError> {
-        self.run(LOOK)
+        self.machine.run_on(self.machine.now() + LOOK).map_err(gone)
     }
 
     fn now(&self) -> Duration {

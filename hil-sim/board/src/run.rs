@@ -15,7 +15,7 @@ use crate::chip::map::PARAMETER_SETS;
 use hil_sim::faults::sets;
 use hil_sim::firmware::Footprint;
 use hil_sim::params::set_of;
-use hil_sim::record::{JoinedLog, LogLine, Recording};
+use hil_sim::record::{JoinedLog, LogLine, Recording, letter, starter};
 use hil_sim::scenario::injection::{Injection, Target};
 use hil_sim::scenario::{ControllerKind, Scenario};
 use hil_sim::session::longest_s;
@@ -91,28 +91,31 @@ pub fn run(
         bench.machine.count_waits()?;
     }
     let (mut log, mut lines_of_log) = (JoinedLog::new(0), Vec::new());
-    bench.starts = true;
+    let (mut start, mut idle) = (Some(letter(starter(scenario.run.direction))), false);
     let started = Instant::now();
     let mut after = AFTER;
     let mut gathered = Gathered::default();
     let mut stream = Vec::new();
     let mut ends_at = longest_s(&scenario.rig);
     while bench.time_s() < ends_at && after > 0 {
-        let waited = bench.starts;
+        let waited = start.is_some();
         let restarts = bench.machine.restarts().len();
         log.add(bench.plant.truth());
         let t_s = bench.time_s();
         let (_, lines) = bench.step()?;
         for line in &lines {
             watch(bench.time_s(), line);
+            idle |= line.text.contains("mode: idle");
             let level = if line.level.is_empty() { "" } else { " " };
             let text = format!("{}{level}{}", line.level, line.text);
             lines_of_log.push(LogLine { t_s, text });
         }
-        if waited && !bench.starts {
-            gathered.begin(&mut bench.machine);
-        } else {
-            gathered.gather(&mut bench.machine);
+        match start {
+            Some(letter) if idle && bench.send(letter)? => {
+                start = None;
+                gathered.begin(&mut bench.machine);
+            }
+            _ => gathered.gather(&mut bench.machine),
         }
         let frames = bench.take_frames();
         if bench.machine.restarts().len() > restarts {

@@ -5,6 +5,7 @@ use std::process::{Command, Stdio};
 
 use clap::ValueEnum;
 use hil_sim::bringup::{self, Line, Progress, Stdin};
+use hil_sim::probe::Port;
 use hil_sim::record::Run;
 use hil_sim::replay::replay;
 use hil_sim::scenario::Scenario;
@@ -18,19 +19,25 @@ use rig_board::bringup::Attended;
 use rig_board::wiring::Mistake;
 use serde_json::Value;
 
-use crate::common::{Board, elf, strings};
+use crate::common::{Board, OnUsb, elf, strings};
 
 /// The power-up of a board with these mistakes, every motion allowed.
 fn power_up(mistakes: &[Mistake]) -> Progress {
-    let bench = Bench::wired(elf(), strings(), &Scenario::default(), mistakes).expect("a bench");
-    power_up_at(Attended::new(bench), mistakes)
+    power_up_over(mistakes, |board| board)
 }
 
-fn power_up_at(mut board: Attended<'_>, mistakes: &[Mistake]) -> Progress {
+/// The same over this port to the board.
+fn power_up_over<P: Port>(
+    mistakes: &[Mistake],
+    port: impl FnOnce(Attended<'static>) -> P,
+) -> Progress {
     let scenario = Scenario::default();
+    let bench = Bench::wired(elf(), strings(), &scenario, mistakes).expect("a bench");
+    let board = Attended::new(bench);
     let mut person = board.person(Stdin::new(std::io::empty(), std::io::sink(), true));
     let mut progress = Progress::new(scenario);
-    let mut line = Line::new(&mut board);
+    let mut port = port(board);
+    let mut line = Line::new(&mut port);
     let (mut said, mut kept) = (Vec::new(), 0);
     let mut say = |text: &str| said.push(text.to_owned());
     let ended = bringup::run(&mut line, &mut person, &mut progress, &mut say, &mut |_| kept += 1);
@@ -46,8 +53,7 @@ fn assert_passed(progress: &Progress) {
 
 #[test]
 fn a_sound_board_passes_every_check_over_a_slow_probe() {
-    let bench = Bench::new(elf(), strings(), &Scenario::default()).expect("a bench");
-    assert_passed(&power_up_at(Attended::new(bench).on_usb(), &[]));
+    assert_passed(&power_up_over(&[], OnUsb::new));
 }
 
 #[test]

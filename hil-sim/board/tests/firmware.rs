@@ -10,10 +10,10 @@ use interstage::restart::{Reset, Restart};
 use interstage::supervise::Mode;
 use rig_board::chip::Pin;
 use rig_board::core::{Access, Bus};
-use rig_board::faults::Fault;
+use rig_board::faults::switch;
 use rig_board::peripherals::rcc::Cause;
 
-use crate::common::{Board, ran, scenario};
+use crate::common::{Board, fault, ran, scenario};
 
 fn press(board: &mut Board, pressed: bool) {
     let now = board.machine().now();
@@ -280,13 +280,13 @@ fn a_driver_on_the_wrong_timer_channel_is_caught() {
 #[test]
 fn an_interrupt_flag_that_is_not_cleared_is_caught() {
     let mut board = Board::off(&[]);
-    board.strike(Fault::TimerFlags);
+    board.strike(fault(Target::Timer, Kind::Stuck));
     board.run(2000);
     assert!(!board.said("mode: idle"), "it starts as if nothing were wrong: {:#?}", board.log);
 }
 
 /// A run with a fault that comes when this is logged; what is logged after that.
-fn struck(text: &str, fault: Fault, milliseconds: u32) -> (Board, Vec<String>) {
+fn struck(text: &str, fault: Injection, milliseconds: u32) -> (Board, Vec<String>) {
     let mut board = Board::moving();
     board.until(text, 8000);
     let from = board.log.len();
@@ -299,12 +299,12 @@ fn struck(text: &str, fault: Fault, milliseconds: u32) -> (Board, Vec<String>) {
 #[test]
 fn a_broken_sensor_under_way_stops_the_drive_with_a_fault() {
     for fault in [
-        Fault::StuckCode(0, 0xFFFF),
-        Fault::StuckCode(1, 0),
-        Fault::BitErrors(1 << 9),
-        Fault::AngleLost,
-        Fault::EncoderLine(1),
-        Fault::DmaStalled,
+        Injection::at(Target::PreloadSensorConverter, Kind::Stuck, 0.0, 65_535.0),
+        Injection::at(Target::TreadConverter, Kind::Stuck, 0.0, 0.0),
+        Injection::at(Target::AngleBus, Kind::BitErrors, 0.0, 512.0),
+        fault(Target::AngleBus, Kind::Off),
+        fault(Target::EncoderLineB, Kind::Off),
+        fault(Target::Dma, Kind::Stalled),
     ] {
         let (mut board, lines) = struck("deploying: approach", fault, 1500);
         assert!(lines.iter().any(|line| line.contains("] fault ")), "{fault:?}: {lines:#?}");
@@ -318,10 +318,10 @@ fn bit_errors_that_pass_are_ridden_out() {
     let mut board = Board::moving();
     board.until("deploying: approach", 8000);
     for _ in 0..5 {
-        let fault = Fault::BitErrors(1 << 5);
+        let fault = Injection::at(Target::AngleBus, Kind::BitErrors, 0.0, 32.0);
         board.strike(fault);
         board.run(3);
-        fault.switch(board.machine(), false).expect("a fault");
+        switch(board.machine(), &fault, false).expect("a fault");
         board.run(40);
     }
     assert!(!board.said("] fault "), "{:#?}", board.log);

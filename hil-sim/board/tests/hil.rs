@@ -2,13 +2,12 @@
 //! in the firmware with the feature `hil`.
 
 use std::sync::OnceLock;
-use std::time::Duration;
 
 use hil_sim::firmware::{self, Profile};
 use hil_sim::hil::{self, Asked, HilError, HostLine, Image};
 use hil_sim::plant::rig::VirtualRig;
 use hil_sim::plant::sensors::Sensors;
-use hil_sim::probe::{Port, PortError};
+use hil_sim::probe::Port;
 use hil_sim::record::Recording;
 use hil_sim::record::{Controller, Run};
 use hil_sim::replay::replay;
@@ -22,7 +21,7 @@ use rig_board::bench::STEP;
 use rig_board::log::Strings;
 use rig_board::port::EmulatedPort;
 
-use crate::common::{self, scenario};
+use crate::common::{self, OnUsb, scenario};
 
 fn elf() -> &'static [u8] {
     static ELF: OnceLock<Vec<u8>> = OnceLock::new();
@@ -75,38 +74,9 @@ fn bridges_have_no_power(port: &mut EmulatedPort) {
     }
 }
 
-/// A port that takes what is sent in pieces.
-struct InPieces(EmulatedPort);
-
-impl Port for InPieces {
-    fn up(&mut self, channel: u32) -> Result<Vec<u8>, PortError> {
-        self.0.up(channel)
-    }
-
-    fn down(&mut self, channel: u32, bytes: &[u8]) -> Result<usize, PortError> {
-        self.0.down(channel, &bytes[..bytes.len().min(5)])
-    }
-
-    fn reset(&mut self) -> Result<(), PortError> {
-        self.0.reset()
-    }
-
-    fn memory(&mut self, address: u32, into: &mut [u8]) -> Result<(), PortError> {
-        self.0.memory(address, into)
-    }
-
-    fn pass(&mut self) -> Result<(), PortError> {
-        self.0.pass()
-    }
-
-    fn now(&self) -> Duration {
-        self.0.now()
-    }
-}
-
 #[test]
 fn a_slow_port_stretches_time_and_changes_nothing() {
-    let (mut slow, mut fast) = (InPieces(board().on_usb()), board());
+    let (mut slow, mut fast) = (OnUsb::new(board()), board());
     let (mut slow_rig, mut fast_rig) = (Rigged::new(5), Rigged::new(5));
     let (mut slow_line, mut fast_line) =
         (HostLine::begin(&mut slow).expect("ready"), HostLine::begin(&mut fast).expect("ready"));

@@ -1,6 +1,7 @@
 //! What the board's flash keeps beside parameters: the state of the drive when the supply
 //! fell, and the checksum of the image.
 
+use hil_sim::scenario::injection::{Kind, Target};
 use interstage::params::slots::SLOT_BYTES;
 use interstage::restart::page::PAGE_BYTES;
 use interstage::restart::{DriveSnapshot, Reset, Restart, Stopped};
@@ -8,14 +9,13 @@ use interstage::supervise::Mode;
 use rig_board::bench::STEP;
 use rig_board::chip::Pin;
 use rig_board::chip::description::rcc;
-use rig_board::faults::Fault;
 use rig_board::peripherals::flash::Cut;
 use rig_board::peripherals::pwr::{HOLDS, Then};
 use rig_board::peripherals::rcc::Cause;
 use rig_board::peripherals::{HZ, Peripheral};
 use rig_board::thumb::sweep;
 
-use crate::common::Board;
+use crate::common::{Board, fault};
 
 /// Addresses of the pages, as in `docs/PARAMETERS.md`.
 const RECORDS: u32 = 0x0808_0000 - 2 * SLOT_BYTES as u32 - PAGE_BYTES as u32;
@@ -51,7 +51,7 @@ fn assert_unconfirmed(restart: &Restart, at: f64) {
 
 /// Lets the supply fall during a run; the snapshot in the report of the next start.
 fn falls(board: &mut Board) -> Option<DriveSnapshot> {
-    board.strike(Fault::BrownOut);
+    board.strike(fault(Target::Supply, Kind::Off));
     let (cause, after, driven) = board.reset(5);
     assert_eq!(cause, Cause::Power);
     assert!(after <= 1, "{after} ms");
@@ -76,7 +76,7 @@ fn a_supply_that_falls_leaves_a_record_that_is_reported_once() {
         assert!(board.said(said), "{said}: {:#?}", board.log);
     }
     // RAM is lost again, without a warning.
-    board.strike(Fault::SupplyCut);
+    board.strike(fault(Target::Supply, Kind::Gone));
     let second = board.report();
     assert_eq!((second.reset, second.snapshot, second.crash), (Reset::Power, None, None));
 }
@@ -88,7 +88,7 @@ fn a_record_of_the_supply_is_written_in_half_of_its_time() {
     for filled in [0, PAGE_BYTES - 32] {
         let mut board = Board::moving();
         board.machine().poke(RECORDS, &vec![0; filled]).expect("flash");
-        board.strike(Fault::BrownOut);
+        board.strike(fault(Target::Supply, Kind::Off));
         let fell = board.bench.machine.now();
         // The record's last word is the lower one of its third double word.
         let written = |board: &Board| page(board, RECORDS)[filled + 16..filled + 20] != [0xFF; 4];
@@ -106,7 +106,7 @@ fn a_record_of_the_supply_is_written_in_half_of_its_time() {
 #[test]
 fn a_supply_that_flickers_leaves_its_first_record() {
     let mut board = Board::moving();
-    board.strike(Fault::BrownOut);
+    board.strike(fault(Target::Supply, Kind::Off));
     until_taken(&mut board);
     let snapshot = falls(&mut board).expect("the same record");
     assert!(matches!(snapshot.mode(), Some(Mode::Run(..))), "{snapshot:?}");
@@ -123,7 +123,7 @@ fn a_record_is_intact_or_absent_whenever_power_is_lost() {
         board.until("deploying: cruise", 6000);
         board.frames.clear();
         board.machine().chip_mut().flash.cut_power(Cut::Within(operations));
-        board.strike(Fault::BrownOut);
+        board.strike(fault(Target::Supply, Kind::Off));
         board.reset(5);
         let restart = board.report();
         assert_eq!(restart.snapshot.is_some(), intact, "{operations}: {restart}");
@@ -144,7 +144,7 @@ fn a_full_page_of_records_makes_room() {
     let mut board = Board::idle();
     let full = [0; PAGE_BYTES];
     board.machine().poke(RECORDS, &full).expect("flash");
-    board.strike(Fault::ResetPin);
+    board.strike(fault(Target::ResetPin, Kind::Reset));
     board.until("mode: idle", 3000);
     assert_eq!(page(&board, RECORDS), [0xFF; PAGE_BYTES]);
     board.frames.clear();
@@ -156,7 +156,7 @@ fn a_full_page_of_records_makes_room() {
 fn a_dip_of_the_supply_cuts_the_bridges_and_restarts() {
     let mut board = Board::moving();
     let at = board.position_mm();
-    board.strike(Fault::SupplyDip);
+    board.strike(fault(Target::Supply, Kind::Weak));
     let (cause, after, driven) = board.reset(60);
     assert_eq!(cause, Cause::Software);
     assert!(after < 40, "{after} ms");
@@ -198,10 +198,10 @@ fn a_low_supply_until_the_watchdog_resets_is_no_hang() {
 fn a_reset_after_a_lost_supply_leaves_its_position_unconfirmed() {
     let mut board = Board::moving();
     let at = board.position_mm();
-    board.strike(Fault::BrownOut);
+    board.strike(fault(Target::Supply, Kind::Off));
     board.reset(5);
     until_taken(&mut board);
-    board.strike(Fault::ResetPin);
+    board.strike(fault(Target::ResetPin, Kind::Reset));
     let restart = board.report();
     assert_eq!((restart.reset, restart.crash), (Reset::Pin, None));
     assert_unconfirmed(&restart, at);
@@ -214,7 +214,7 @@ fn a_position_without_a_detected_step_stays_unconfirmed() {
     let lost = falls(&mut board).expect("a record");
     for _ in 0..2 {
         board.run(50);
-        board.strike(Fault::ResetPin);
+        board.strike(fault(Target::ResetPin, Kind::Reset));
         let restart = board.report();
         assert!(restart.snapshot.is_some_and(|snapshot| snapshot.tick != lost.tick), "{restart}");
         assert_unconfirmed(&restart, at);
@@ -224,7 +224,7 @@ fn a_position_without_a_detected_step_stays_unconfirmed() {
 #[test]
 fn a_reset_into_a_low_supply_leaves_its_place_unsure() {
     let mut board = Board::moving();
-    board.strike(Fault::ResetPin);
+    board.strike(fault(Target::ResetPin, Kind::Reset));
     sags(&mut board, 300);
     let restart = board.report();
     assert_eq!((restart.reset, restart.crash), (Reset::Power, None));
@@ -254,7 +254,7 @@ fn the_first_start_of_an_image_stores_its_checksum() {
     let checksums = page(&board, CHECKSUMS);
     assert_ne!(checksums[..16], [0xFF; 16]);
     assert_eq!(checksums[16..], [0xFF; PAGE_BYTES - 16]);
-    board.strike(Fault::ResetPin);
+    board.strike(fault(Target::ResetPin, Kind::Reset));
     board.until("mode: idle", 3000);
     assert_eq!(first(&board), 1, "known by now");
     assert_eq!(page(&board, CHECKSUMS), checksums);
@@ -272,8 +272,7 @@ fn places(board: &Board) -> Vec<u32> {
 fn an_inverted_bit_of_the_image_is_reported_and_held() {
     for place in places(&Board::idle()) {
         let mut board = Board::moving();
-        let flip = Fault::BitFlip(place, 4);
-        board.strike(flip);
+        board.flip(place, 4);
         board.until(DAMAGED, CHECKED_MS);
         let (cause, _, driven) = board.reset(20);
         assert_eq!(cause, Cause::Software, "{place:#x}");
@@ -285,8 +284,8 @@ fn an_inverted_bit_of_the_image_is_reported_and_held() {
         }
         board.assert_off(500);
         // Flashed again, it goes on.
-        board.strike(flip);
-        board.strike(Fault::ResetPin);
+        board.flip(place, 4);
+        board.strike(fault(Target::ResetPin, Kind::Reset));
         board.until("mode: idle", 3000);
     }
 }
@@ -308,7 +307,7 @@ fn an_image_names_no_folder_of_the_machine_that_built_it() {
 fn a_damaged_image_that_no_longer_starts_is_reported() {
     let mut board = Board::moving();
     let copies = board.function("compiler_builtins::mem::memcpy");
-    board.strike(Fault::BitFlip(copies + 0x22F, 4));
+    board.flip(copies + 0x22F, 4);
     board.until(DAMAGED, CHECKED_MS);
     // Off from here on, however often it restarts.
     board.step();
@@ -325,7 +324,7 @@ const CLOCKS_HZ: [f64; 2] = [16e6, HZ as f64];
 fn a_damaged_image_that_cannot_log_blinks() {
     let lit = |board: &Board| board.bench.machine.chip().level(Pin::LIGHT);
     let mut board = Board::moving();
-    board.strike(Fault::ResetPin);
+    board.strike(fault(Target::ResetPin, Kind::Reset));
     let from = board.log.len();
     while board.log.len() == from {
         board.step();
@@ -334,8 +333,8 @@ fn a_damaged_image_that_cannot_log_blinks() {
     let mut board = Board::moving();
     // The bit after which no start comes to its first word.
     let copies = board.function("compiler_builtins::mem::memcpy");
-    board.strike(Fault::BitFlip(copies + 0x115, 4));
-    board.strike(Fault::ResetPin);
+    board.flip(copies + 0x115, 4);
+    board.strike(fault(Target::ResetPin, Kind::Reset));
     board.step();
     let from = board.log.len();
     let (mut time_s, mut lights, mut rises) = (0.0, 0, Vec::new());

@@ -8,7 +8,7 @@ use hil_sim::scenario::{Direction, Scenario};
 use rig_board::bench::Bench;
 use rig_board::bringup::Attended;
 
-use crate::common::{elf, strings};
+use crate::common::{OnUsb, elf, strings};
 
 fn bench(direction: Direction) -> Bench<'static> {
     let mut scenario = Scenario::default();
@@ -74,8 +74,9 @@ fn the_operators_stop_ends_what_moves_and_a_jog_goes_as_far_as_it_was_asked() {
 
 #[test]
 fn a_fault_is_named_and_nothing_moves_until_it_is_reset() {
-    let mut attended = Attended::new(bench(Direction::Deploy)).on_usb();
+    let attended = Attended::new(bench(Direction::Deploy));
     let mut beside = attended.person(person());
+    let mut attended = OnUsb::new(attended);
     for action in [Action::SwitchOn, Action::PressStop] {
         beside.act(action).expect("a hand");
     }

@@ -7,7 +7,7 @@ use rig_board::log::Reader;
 use rig_board::peripherals::rcc::Cause;
 use rig_board::port::EmulatedPort;
 
-use crate::common::{elf, strings};
+use crate::common::{OnUsb, elf, strings};
 
 fn port() -> EmulatedPort {
     EmulatedPort::new(elf()).expect("an image")
@@ -45,8 +45,8 @@ fn a_board_that_restarts_is_heard_again_and_gets_no_key_meanwhile() {
 /// Every time-out counts by what the port says.
 #[test]
 fn the_time_of_a_port_includes_that_of_its_accesses() {
-    let mut port = port().on_usb();
-    let (before, since) = (port.machine.now(), port.now());
+    let mut port = OnUsb::new(port());
+    let (before, since) = (port.port.machine.now(), port.now());
     for _ in 0..50 {
         for _ in 0..10 {
             port.up(0).expect("reads");
@@ -54,7 +54,7 @@ fn the_time_of_a_port_includes_that_of_its_accesses() {
         port.pass().expect("runs");
     }
     let passed = port.now() - since;
-    let true_s = (port.machine.now() - before) as f64 / 170e6;
+    let true_s = (port.port.machine.now() - before) as f64 / 170e6;
     assert!(true_s > 0.37, "500 accesses, one of them long");
     assert!((passed.as_secs_f64() - true_s).abs() < 1e-3, "{passed:?} of {true_s} s");
 }

@@ -2,15 +2,16 @@
 //! reports the cause.
 
 use hil_sim::faults::campaign::Case;
+use hil_sim::scenario::injection::{Kind, Target};
 use interstage::restart::{MissedCheckIns, Reset, Restart, Stopped};
 use interstage::supervise::Mode;
 use interstage::units::Direction;
 use rig_board::bench::STEP;
 use rig_board::core::Register;
-use rig_board::faults::Fault;
+use rig_board::faults::switch;
 use rig_board::peripherals::rcc::Cause;
 
-use crate::common::{Board, tried};
+use crate::common::{Board, fault, tried};
 
 fn hang(restart: &Restart) -> (u32, MissedCheckIns) {
     match restart.crash.map(|crash| crash.stopped) {
@@ -120,7 +121,7 @@ fn the_task_that_hangs_is_named_whichever_it_is() {
     for (task, name, cycles) in TASKS {
         let mut board = Board::moving();
         into_poll(&mut board, task, cycles);
-        board.strike(Fault::Caught);
+        board.strike(fault(Target::Processor, Kind::Hung));
         let (cause, after, driven) = board.reset(250);
         assert_eq!(cause, Cause::Watchdog, "{task}");
         // Time until the task is missed, and that of the watchdog.
@@ -140,13 +141,14 @@ fn an_interrupt_that_never_ceases_ends_in_a_reset_that_names_the_starved_tick() 
     // Between two ticks.
     into_poll(&mut board, "journal", 300);
     let at = board.position_mm();
-    board.strike(Fault::ButtonStorm);
+    board.strike(fault(Target::Interrupt, Kind::Flooding));
     let (cause, after, driven) = board.reset(150);
     assert_eq!(cause, Cause::Watchdog);
     assert!(after <= 115, "{after} ms");
     // The system timer's interrupt is more urgent and cuts before the watchdog resets.
     assert_cut(&driven, 85);
-    Fault::ButtonStorm.switch(board.machine(), false).expect("a fault");
+    let storm = fault(Target::Interrupt, Kind::Flooding);
+    switch(board.machine(), &storm, false).expect("a fault");
     let restart = board.report();
     let (pc, missed) = hang(&restart);
     assert_eq!(missed, MissedCheckIns::STARVED);
@@ -159,7 +161,7 @@ fn an_interrupt_that_never_ceases_ends_in_a_reset_that_names_the_starved_tick() 
 fn interrupts_masked_for_good_end_in_a_reset_with_what_the_drive_did() {
     let mut board = Board::moving();
     board.set(Register::Primask, 1);
-    board.strike(Fault::Caught);
+    board.strike(fault(Target::Processor, Kind::Hung));
     let (cause, _, _) = board.reset(150);
     assert_eq!(cause, Cause::Watchdog);
     let restart = board.report();
@@ -170,7 +172,7 @@ fn interrupts_masked_for_good_end_in_a_reset_with_what_the_drive_did() {
 #[test]
 fn a_report_is_made_once() {
     let mut board = Board::moving();
-    board.strike(Fault::ResetPin);
+    board.strike(fault(Target::ResetPin, Kind::Reset));
     let first = board.report();
     assert_eq!(first.reset, Reset::Pin);
     assert!(matches!(first.snapshot.and_then(|f| f.mode()), Some(Mode::Run(..))));

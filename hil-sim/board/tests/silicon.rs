@@ -1,11 +1,11 @@
 //! What the chip and the sensor on its bus do by their manuals, and a firmware has to know.
 
+use hil_sim::scenario::injection::{Injection, Kind, Target};
 use interstage::restart::Stopped;
 use rig_board::bench::STEP;
 use rig_board::chip::description::flash::{self, acr};
 use rig_board::chip::description::{self, rcc};
 use rig_board::core::{Access, Bus, Register};
-use rig_board::faults::Fault;
 use rig_board::machine::Machine;
 use rig_board::peripherals::flash::Wrong;
 use rig_board::peripherals::iwdg::LSI_RANGE_HZ;
@@ -13,7 +13,7 @@ use rig_board::peripherals::pwr::Then;
 use rig_board::peripherals::rcc::Cause;
 use rig_board::peripherals::{HZ, Peripheral};
 
-use crate::common::Board;
+use crate::common::{Board, fault};
 
 #[test]
 fn a_reset_in_the_middle_of_a_frame_does_not_silence_the_angle_sensor() {
@@ -32,7 +32,7 @@ fn a_reset_in_the_middle_of_a_frame_does_not_silence_the_angle_sensor() {
 #[test]
 fn a_missing_magnet_is_named() {
     let mut board = Board::off(&[]);
-    board.strike(Fault::MagnetLost);
+    board.strike(fault(Target::Magnet, Kind::Gone));
     board.until("fault 106", 3000);
     assert!(board.said("magnet"), "{:#?}", board.log);
 }
@@ -44,7 +44,7 @@ fn the_data_cache_is_off_whenever_flash_is_written() {
     assert!(flash.begun > 0, "the first start stores the checksum");
     assert_eq!(flash.cache_hazards, 0);
     // The record of a supply that falls.
-    board.strike(Fault::BrownOut);
+    board.strike(fault(Target::Supply, Kind::Off));
     board.until("mode: idle", 3000);
     let flash = &board.machine().chip().flash;
     assert_eq!(flash.cache_hazards, 0);
@@ -188,7 +188,7 @@ fn a_damaged_flash_cuts_the_bridges_without_the_software() {
     let hang = board.machine();
     hang.hang().expect("hangs");
     // The code that it hangs in.
-    Fault::WrongBits(hang.pc(), Wrong::Two).switch(hang, true).expect("strikes");
+    hang.spoil(hang.pc(), Wrong::Two).expect("a place");
     board.step();
     assert_eq!(board.step().drives.drive, 0.0);
 }
@@ -250,7 +250,7 @@ fn a_core_halted_by_a_debugger_drives_nothing_and_then_goes_on() {
     for milliseconds in [1, 5, 50] {
         let mut board = Board::moving();
         let before = board.position_mm();
-        board.strike(Fault::Halted(milliseconds));
+        board.strike(Injection::at(Target::Debugger, Kind::Halted, 0.0, milliseconds.into()));
         for millisecond in 0..milliseconds {
             let drives = board.step().drives;
             assert!(millisecond == 0 || drives.drive == 0.0, "{drives:?}");
@@ -273,8 +273,8 @@ fn a_fault_after_a_long_halt_of_the_core_has_its_cause_before_it_in_the_log() {
         let mut board = Board::moving();
         board.until("sliding on the corner", 5000);
         board.run(150);
-        board.strike(Fault::Halted(milliseconds));
-        board.run(u32::from(milliseconds) + 300);
+        board.strike(Injection::at(Target::Debugger, Kind::Halted, 0.0, milliseconds.into()));
+        board.run(milliseconds + 300);
         let at = |text: &str| board.log.iter().position(|line| line.contains(text));
         let (halt, fault) = (at("limit 216: a debugger halted"), at("] fault "));
         assert!(halt.is_some() && fault > halt, "{:#?}", board.log);
@@ -338,7 +338,7 @@ fn two_wrong_bits_in_code_that_runs_end_it_and_are_no_emergency_stop() {
         let mut board = Board::moving();
         // Its first whole double word: the one before is also another function's.
         let place = board.function(EVERY_MILLISECOND).next_multiple_of(8);
-        board.strike(Fault::WrongBits(place, wrong));
+        board.machine().spoil(place, wrong).expect("a place");
         let (cause, after, driven) = board.reset(150);
         assert_eq!(cause, Cause::Software, "{:#?}", board.log);
         assert!(after < 30 && !driven[2..].contains(&true), "{after} ms: {driven:?}");
@@ -356,7 +356,7 @@ fn two_wrong_bits_in_code_that_runs_end_it_and_are_no_emergency_stop() {
 fn one_wrong_bit_in_code_that_runs_is_corrected() {
     let mut board = Board::moving();
     let place = board.function(EVERY_MILLISECOND);
-    board.strike(Fault::WrongBits(place, Wrong::One));
+    board.machine().spoil(place, Wrong::One).expect("a place");
     board.until("mode: deployed", 20_000);
     assert!(!board.said("] fault ") && board.machine().restarts().is_empty());
     let ecc = board.machine().chip_mut().flash.read(flash::ECCR, 0).expect("a register");
@@ -366,8 +366,8 @@ fn one_wrong_bit_in_code_that_runs_is_corrected() {
 #[test]
 fn a_shorted_stop_wire_hides_the_button_until_the_motors_lack_their_supply() {
     let mut board = Board::moving();
-    board.strike(Fault::StopShorted);
-    board.strike(Fault::StopTorn);
+    board.strike(fault(Target::StopWire, Kind::Shorted));
+    board.strike(fault(Target::StopWire, Kind::Off));
     board.run(100);
     assert!(!board.said("] fault "), "only the contact in the motors' supply cuts");
 }

@@ -7,13 +7,13 @@ mod twin;
 use std::borrow::Cow;
 
 use interstage::rig::Rig;
-use interstage::supervise::{Leg, Mode};
+use interstage::supervise::{Command, Leg, Mode};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::judge::{Finding, Judge};
 use crate::campaign::{Campaign, Watch};
-use crate::plant::rig::VirtualRig;
+use crate::injector::FaultTimes;
 use crate::scenario::Scenario;
 use crate::scenario::injection::{Injection, Kind, Target};
 use crate::session::{self, Options, RunError, RunningRig, Session};
@@ -67,22 +67,101 @@ pub struct Instant {
     pub harms: Vec<String>,
 }
 
-impl Instant {
-    /// What the judge has seen of a run of this scenario whose largest gap was `gap_part` of the
-    /// reference.
-    pub fn judged(scenario: &Scenario, judge: &Judge, twin: &Twin, gap_part: f64) -> Self {
-        Self {
+/// A run with its fault, beside its twin.
+pub struct Trial<'a> {
+    scenario: &'a Scenario,
+    twin: &'a Twin,
+    pub judge: Judge,
+    during: &'static str,
+    times: FaultTimes,
+    /// Largest gap over the reference gap.
+    gap_part: f64,
+    /// Every step was crossed in both directions.
+    pub crossed: bool,
+}
+
+impl<'a> Trial<'a> {
+    /// Runs a rig until its run has been over for `after_s`. After each tick, `is_over` gets its
+    /// time, s, its command and whether the operator is done, and decides whether the run is over.
+    pub fn run<R: RunningRig>(
+        rig: &mut R,
+        scenario: &'a Scenario,
+        twin: &'a Twin,
+        after_s: f64,
+        mut is_over: impl FnMut(&R, f64, Option<Command>, bool) -> bool,
+    ) -> Result<Self, R::Error> {
+        let injection = scenario.run.faults.first();
+        let mut judge = Judge::new(scenario, rig.plant().truth());
+        let mut operator = Operator::default();
+        let (mut during, mut over_s, mut worst_mm) = (None, 0.0, 0.0f64);
+        let longest_s = longest_s(&scenario.rig);
+        while rig.time_s() < longest_s {
+            let (t_s, before) = (rig.time_s(), rig.mode());
+            let command = if rig.is_free() { operator.command(before) } else { None };
+            let output = rig.step(command)?;
+            let struck = rig.fault_times().struck_s.is_some();
+            if struck && during.is_none() {
+                during = Some(doing(before));
+                if injection.is_some_and(|fault| fault.target == Target::Reset) {
+                    operator.press_again();
+                }
+            }
+            let truth = rig.plant().truth();
+            judge.look(t_s, &output, truth, struck || injection.is_none());
+            if rig.mode().moves() {
+                worst_mm = worst_mm.max(truth.separation_mm);
+            }
+            let over = is_over(rig, t_s, command, operator.over(rig.mode()));
+            over_s = if over { over_s + 1e-3 } else { 0.0 };
+            if over && over_s >= after_s {
+                break;
+            }
+        }
+        let crossings = rig.plant().ledger().crossings();
+        let steps = rig.plant().parameters().wall.steps().len();
+        let [out, back] = twin.gap_ref_mm;
+        let parts = crossings.iter().map(|c| c.gap_mm / if c.climbing { out } else { back });
+        Ok(Self {
+            scenario,
+            twin,
+            judge,
+            during: during.unwrap_or("at rest"),
+            times: rig.fault_times(),
+            gap_part: parts.fold(worst_mm / out, f64::max),
+            crossed: crossings.len() == 2 * steps,
+        })
+    }
+
+    /// What became of the fault by the judge.
+    pub fn finding(&self) -> Finding {
+        self.judge.finding(&self.twin.limits, self.gap_part, self.crossed)
+    }
+
+    /// The report that counts: when, s, and its code.
+    pub fn report(&self) -> Option<(f64, u16)> {
+        self.judge.report(&self.twin.limits)
+    }
+
+    /// What became of the fault, which was reported at this time, s.
+    pub fn found(&self, reported_s: Option<f64>) -> Instant {
+        let (scenario, judge, times) = (self.scenario, &self.judge, self.times);
+        let since = |from_s: Option<f64>| Some(1e3 * (reported_s? - from_s?).max(0.0));
+        Instant {
             seed: scenario.run.seed,
+            at_s: times.struck_s,
             magnitude: scenario.run.faults.first().map(Injection::magnitude),
-            during: "at rest".into(),
-            code: judge.report(&twin.limits).map(|(_, code)| code),
+            during: self.during.into(),
+            finding: self.finding(),
+            code: self.report().map(|(_, code)| code),
+            restart: None,
+            // A report before the first effect has no latency.
+            latency_ms: since(times.shows_s).or(since(times.acts_s).map(|_| 0.0)),
             rest_ms: judge.fault.and_then(|(at_s, _)| Some(1e3 * (judge.rest_s? - at_s).max(0.0))),
             end: judge.end().into(),
             peak_preload_n: judge.peak_preload_n,
             motion_mm: judge.motion_mm,
-            gap_part,
+            gap_part: self.gap_part,
             harms: judge.harms(),
-            ..Self::default()
         }
     }
 }
@@ -155,7 +234,7 @@ impl FaultCampaign {
 }
 
 /// A name for what the drive is doing.
-pub fn doing(mode: Mode) -> &'static str {
+fn doing(mode: Mode) -> &'static str {
     match mode {
         Mode::Preload(_) => "preload",
         Mode::Run(_, Leg::Cruise) => "cruise",
@@ -165,16 +244,6 @@ pub fn doing(mode: Mode) -> &'static str {
         Mode::Stopping(_) => "stopping",
         _ => "at rest",
     }
-}
-
-/// Largest gap over the reference gap, of crossings and elsewhere (`worst_mm`), and whether
-/// every step was crossed in both directions.
-pub fn crossed(plant: &VirtualRig, twin: &Twin, worst_mm: f64) -> (f64, bool) {
-    let crossings = plant.ledger().crossings();
-    let steps = plant.parameters().wall.steps().len();
-    let [out, back] = twin.gap_ref_mm;
-    let parts = crossings.iter().map(|c| c.gap_mm / if c.climbing { out } else { back });
-    (parts.fold(worst_mm / out, f64::max), crossings.len() == 2 * steps)
 }
 
 /// Runs a scenario in software without a fault.
@@ -191,51 +260,14 @@ pub fn twin(scenario: &Scenario) -> Result<Twin, RunError> {
 /// [`RunError`] if it cannot be made.
 pub fn watched(scenario: &Scenario, twin: &Twin) -> Result<Instant, RunError> {
     let mut session = Session::new(scenario, Options::default())?;
-    let mut judge = Judge::new(scenario, session.plant().truth());
-    let mut operator = Operator::default();
-    let injection = scenario.run.faults.first();
-    let reset = injection.filter(|fault| fault.target == Target::Reset).map(|fault| fault.kind);
-    let (mut during, mut after_s, mut worst_mm) = ("at rest", 0.0, 0.0f64);
-    let longest_s = longest_s(&scenario.rig);
-    while session.time_s() < longest_s && after_s < AFTER_S {
-        let t_s = session.time_s();
-        let before = session.mode();
-        let command = operator.command(before);
-        let output = session.step(command)?;
-        let struck_s = session.fault_times().struck_s;
-        let active = injection.is_none() || struck_s.is_some();
-        if struck_s == Some(t_s) {
-            during = doing(before);
-            if reset.is_some() {
-                operator.press_again();
-            }
-        }
-        let truth = session.plant().truth();
-        judge.look(t_s, &output, truth, active);
-        if session.mode().moves() {
-            worst_mm = worst_mm.max(truth.separation_mm);
-        }
-        after_s = if operator.over(session.mode()) { after_s + 1e-3 } else { 0.0 };
-    }
-    let (gap_part, crossed) = crossed(session.plant(), twin, worst_mm);
-    let finding = judge.finding(&twin.limits, gap_part, crossed);
-    let report = judge.report(&twin.limits);
-    let times = session.fault_times();
-    let since = |from_s: Option<f64>| {
-        let ((to_s, _), from_s) = (report?, from_s?);
-        Some(1e3 * (to_s - from_s).max(0.0))
-    };
+    let trial = Trial::run(&mut session, scenario, twin, AFTER_S, |_, _, _, over| over)?;
+    let reset = scenario.run.faults.first().filter(|fault| fault.target == Target::Reset);
     Ok(Instant {
-        at_s: times.struck_s,
-        during: during.into(),
-        finding,
-        restart: reset.map(|kind| match kind {
+        restart: reset.map(|fault| match fault.kind {
             Kind::Recorded => "reset by pin".into(),
             _ => "reset by supply".into(),
         }),
-        // A report before the first effect has no latency.
-        latency_ms: since(times.shows_s).or(since(times.acts_s).map(|_| 0.0)),
-        ..Instant::judged(scenario, &judge, twin, gap_part)
+        ..trial.found(trial.report().map(|(at_s, _)| at_s))
     })
 }
 

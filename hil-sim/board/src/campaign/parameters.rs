@@ -9,11 +9,11 @@
 
 use interstage::params::slots::SLOT_BYTES;
 
-use super::{AFTER_S, Board, IMAGE, IMAGE_DAMAGED, Saving, Twin};
+use super::{AFTER_S, Board, IMAGE, IMAGE_DAMAGED, Saving};
 use crate::chip::map::PARAMETER_SETS;
 use crate::error::BoardError;
 use crate::peripherals::rcc::Cause;
-use hil_sim::faults::campaign::Instant;
+use hil_sim::faults::campaign::{Instant, Trial};
 use hil_sim::faults::judge::{Finding, Judge};
 use hil_sim::faults::sets;
 use hil_sim::scenario::Scenario;
@@ -61,20 +61,18 @@ impl Parameters {
 /// Judges such a fault after its run.
 pub(super) fn judged(
     mut board: Board<'_>,
-    mut judge: Judge,
+    mut trial: Trial<'_>,
     scenario: &Scenario,
-    twin: &Twin,
-    (gap_part, crossed): (f64, bool),
 ) -> Result<Instant, BoardError> {
     let injection = &scenario.run.faults[0];
     let saving = board.bench.saving();
-    let (mut finding, mut end) = (judge.finding(&twin.limits, gap_part, crossed), judge.end());
-    let report = judge.report(&twin.limits);
+    let (mut finding, mut end) = (trial.finding(), trial.judge.end());
+    let report = trial.report();
     let before = injection.from() == Onset::Time(0.0);
     if saving.is_none() && !before {
-        power_cycle(&mut board, &mut judge)?;
+        power_cycle(&mut board, &mut trial.judge)?;
     }
-    let mut harms = judge.harms();
+    let mut harms = trial.judge.harms();
     harms.extend(harm(&board, scenario, injection)?);
     let held = board.parameters.holds();
     use Target::{ImageSet, OptionBytes, StoredSet};
@@ -82,7 +80,7 @@ pub(super) fn judged(
     if held && !lost {
         harms.push("holds although its parameters are intact".to_owned());
     }
-    if saving.is_some() && before && !crossed {
+    if saving.is_some() && before && !trial.crossed {
         harms.push("does not complete after the save".to_owned());
     }
     let why = match (board.image_s, board.parameters.one_bank) {
@@ -100,6 +98,7 @@ pub(super) fn judged(
     }
     Ok(Instant {
         at_s: board.fault_times().struck_s,
+        during: "at rest".into(),
         finding,
         code: report.map(|(_, code)| code),
         restart: restart.map(Into::into),
@@ -108,7 +107,7 @@ pub(super) fn judged(
         rest_ms: None,
         end: end.into(),
         harms,
-        ..Instant::judged(scenario, &judge, twin, gap_part)
+        ..trial.found(None)
     })
 }
 

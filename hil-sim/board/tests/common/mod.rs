@@ -1,18 +1,22 @@
 //! The firmware for the emulated board, built once, and a running board.
 
 use std::sync::OnceLock;
+use std::time::Duration;
 
 use hil_sim::faults::campaign::{Case, FaultCampaign, Outcome, Twin};
 use hil_sim::firmware::{self, Profile};
+use hil_sim::probe::{Port, PortError};
 use hil_sim::record::Run;
 use hil_sim::scenario::Scenario;
+use hil_sim::scenario::injection::{Injection, Kind, Target};
 use interstage::restart::Restart;
 use interstage::tick::Event;
 use rig_board::bench::{Bench, Passed};
 use rig_board::campaign::{self, Firmware};
 use rig_board::chip::Pin;
 use rig_board::core::Register;
-use rig_board::faults::Fault;
+use rig_board::elf::FLASH;
+use rig_board::faults::switch;
 use rig_board::log::Strings;
 use rig_board::machine::Machine;
 use rig_board::peripherals::rcc::Cause;
@@ -53,6 +57,73 @@ pub(crate) fn tried(cases: Vec<Case>, instants: usize) -> Outcome {
     let failures: Vec<_> = outcome.matrix.iter().flat_map(|line| &line.failures).collect();
     assert_eq!((outcome.undetected, outcome.unheld), (0, 0), "{failures:#?}");
     outcome
+}
+
+/// A fault without magnitude.
+pub(crate) const fn fault(target: Target, kind: Kind) -> Injection {
+    Injection::at(target, kind, 0.0, 0.0)
+}
+
+/// A port at a probe on USB, where accesses take time and what is sent goes in pieces.
+pub(crate) struct OnUsb<P> {
+    pub(crate) port: P,
+    accesses: u32,
+    /// Time that they took and that has not passed at the port, ns; less than nothing if its last
+    /// pause was longer.
+    owed_ns: i64,
+}
+
+impl<P: Port> OnUsb<P> {
+    pub(crate) const fn new(port: P) -> Self {
+        Self { port, accesses: 0, owed_ns: 0 }
+    }
+
+    /// Lets the time of so many accesses pass: half a millisecond each, and an eighth of a second
+    /// now and then.
+    fn access(&mut self, accesses: u32) -> Result<(), PortError> {
+        for _ in 0..accesses {
+            self.accesses += 1;
+            self.owed_ns += if self.accesses.is_multiple_of(400) { 125_000_000 } else { 500_000 };
+        }
+        while self.owed_ns > 0 {
+            let before = self.port.now();
+            self.port.pass()?;
+            self.owed_ns -= (self.port.now() - before).as_nanos() as i64;
+        }
+        Ok(())
+    }
+}
+
+impl<P: Port> Port for OnUsb<P> {
+    fn up(&mut self, channel: u32) -> Result<Vec<u8>, PortError> {
+        // The offsets; then data and read offset.
+        self.access(1)?;
+        let bytes = self.port.up(channel)?;
+        self.access(if bytes.is_empty() { 0 } else { 2 })?;
+        Ok(bytes)
+    }
+
+    fn down(&mut self, channel: u32, bytes: &[u8]) -> Result<usize, PortError> {
+        self.access(4)?;
+        self.port.down(channel, &bytes[..bytes.len().min(5)])
+    }
+
+    fn reset(&mut self) -> Result<(), PortError> {
+        self.port.reset()
+    }
+
+    fn memory(&mut self, address: u32, into: &mut [u8]) -> Result<(), PortError> {
+        self.access(1)?;
+        self.port.memory(address, into)
+    }
+
+    fn pass(&mut self) -> Result<(), PortError> {
+        self.port.pass()
+    }
+
+    fn now(&self) -> Duration {
+        self.port.now()
+    }
 }
 
 /// A running board with its two logs.
@@ -145,8 +216,14 @@ impl Board {
         &mut self.bench.machine
     }
 
-    pub(crate) fn strike(&mut self, fault: Fault) {
-        fault.switch(self.machine(), true).expect("strikes");
+    pub(crate) fn strike(&mut self, fault: Injection) {
+        switch(self.machine(), &fault, true).expect("strikes");
+    }
+
+    /// Inverts this bit of a byte of the image.
+    pub(crate) fn flip(&mut self, address: u32, bit: u32) {
+        let bit = f64::from(8 * (address - FLASH.base) + bit);
+        self.strike(Injection::at(Target::Image, Kind::BitErrors, 0.0, bit));
     }
 
     /// Address of the first function whose name contains this.

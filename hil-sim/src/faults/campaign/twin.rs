@@ -4,12 +4,11 @@
 use interstage::model::Planner;
 use interstage::rig::RigError;
 use interstage::supervise::{Command, Leg, Mode};
-use interstage::tick::{Event, Output};
 use interstage::units::Direction;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
-use super::longest_s;
+use super::Trial;
 use crate::scenario::Scenario;
 use crate::session::RunningRig;
 
@@ -19,8 +18,6 @@ pub struct Twin {
     /// From the command to the end, s since boot.
     pub started_s: f64,
     ended_s: f64,
-    /// Start of the present crossing, s.
-    crossing_s: Option<f64>,
     /// Begin and end of its crossings, s.
     crossings: Vec<(f64, f64)>,
     /// Codes of the limits that it reports.
@@ -41,40 +38,25 @@ impl Twin {
         let planner = Planner::try_build(&scenario.rig)?;
         let gap_ref_mm = Direction::ALL.map(|direction| planner.gap_ref(direction).to_num());
         let mut twin = Self { gap_ref_mm, ..Self::default() };
-        let mut operator = Operator::default();
-        let (longest_s, mut over_s) = (longest_s(&scenario.rig), 0.0);
-        while rig.time_s() < longest_s {
-            let t_s = rig.time_s();
-            let command = operator.command(rig.mode());
-            if !operator.started() {
+        let (alone, mut started, mut crossing_s) = (Self::default(), false, None);
+        let trial = Trial::run(&mut rig, scenario, &alone, after_s, |rig, t_s, command, over| {
+            started |= command.is_some();
+            if !started {
                 twin.started_s = t_s;
             }
-            let output = rig.step(command)?;
-            let over = operator.over(rig.mode()) && command.is_none();
-            twin.note(t_s, rig.mode(), &output, over && after_s > 0.0);
-            over_s = if over { over_s + 1e-3 } else { 0.0 };
-            if over && over_s >= after_s {
-                break;
+            let over = over && command.is_none();
+            if !over || after_s == 0.0 {
+                twin.ended_s = t_s;
             }
-        }
+            if let Mode::Run(_, Leg::Crossing) = rig.mode() {
+                crossing_s.get_or_insert(t_s);
+            } else if let Some(from_s) = crossing_s.take() {
+                twin.crossings.push((from_s, t_s));
+            }
+            over
+        })?;
+        twin.limits = trial.judge.limits.iter().map(|(_, code)| *code).collect();
         Ok(twin)
-    }
-
-    /// A tick, after which the drive is in this mode; `over`: it is behind the end of the run.
-    fn note(&mut self, t_s: f64, mode: Mode, output: &Output, over: bool) {
-        for entry in &output.events {
-            if let Event::Limit(limit) = entry.event {
-                self.limits.push(limit.code());
-            }
-        }
-        if let Mode::Run(_, Leg::Crossing) = mode {
-            self.crossing_s.get_or_insert(t_s);
-        } else if let Some(from_s) = self.crossing_s.take() {
-            self.crossings.push((from_s, t_s));
-        }
-        if !over {
-            self.ended_s = t_s;
-        }
     }
 
     /// A random instant: of every three, one in a crossing and two anywhere in the run.
