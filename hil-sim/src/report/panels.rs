@@ -134,7 +134,7 @@ impl<'a> View<'a> {
     }
 
     /// The controller's curves of a plot, references first, and what is true.
-    fn curves(&self, plot: &str, colour: RGBColor, truth: fn(&TrueState) -> f64) -> Vec<Line> {
+    fn curves(&self, plot: &str, colour: Colour, truth: fn(&TrueState) -> f64) -> Vec<Line> {
         let of_plot = |column: &Column| {
             let (_, name) = column.curve.filter(|curve| curve.0 == plot)?;
             let look = if name == "reference" { Wanted } else { Measured(colour) };
