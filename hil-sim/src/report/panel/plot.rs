@@ -202,7 +202,7 @@ y=\"{low}\" width=\"{wide}\" height=\"{high}\"/>\n"
         for Marks { name, shape, colour, points } in &self.marks {
             let points = points.iter().filter(|point| point.0.is_finite() && point.1.is_finite());
             let d: String = points.map(|at| format!("M{}h0", point(at))).collect();
-            for (class, stroke) in shape.strokes(*colour) {
+            for (class, stroke) in shape.strokes(colour) {
                 svg += &path(class, name, &stroke, &d);
             }
         }
