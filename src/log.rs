@@ -23,7 +23,7 @@ use crc::{CRC_32_ISO_HDLC, Crc, Table};
 
 pub use crate::supervise::codes;
 pub use encoder::{FrameSink, LogEncoder, TICKS_PER_FRAME};
-pub use identity::Identity;
+pub use identity::{Identity, SCHEMA};
 pub use record::{Flags, Record};
 pub use recorder::SnapshotRecorder;
 

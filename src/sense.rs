@@ -5,7 +5,8 @@
 //! # A new sensor
 //! Log, columns, messages of the loop, faults of a scenario and images follow from its line in
 //! `sensors` in `src/sense/raw.rs`. Beside it, for a converter's code that is logged:
-//! 1. `src/board/pins.rs` (its driver) and `src/main.rs` (its task);
+//! 1. `src/board/pins.rs` (its driver) and `src/main.rs` (its task); with a converter of its own
+//!    `src/board.rs` (its interrupt) and `src/board/registers.rs`;
 //! 2. `hil-sim/src/plant/sensors.rs`: what it measures, its code, its noise;
 //! 3. `hil-sim/board/src/chip/pins.rs`: its pin on the emulated board.
 //!
