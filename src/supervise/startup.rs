@@ -41,7 +41,7 @@ pub fn stowed(sensed: &SensedState, pressed: Newtons, zero_limit: Newtons) -> bo
 #[allow(clippy::float_arithmetic, reason = "quantities of a test")]
 mod tests {
     use super::*;
-    use crate::sense::Validity;
+    use crate::sense::{Reason, Validity};
     use crate::units::Q16;
 
     /// Sensor values on this wall, at this speed, preload and compression.
