@@ -244,8 +244,25 @@ mod tests {
         let html = panel.figure("", (540, 250), "name");
         assert!(html.contains("viewBox=\"10 -5 10 4\""), "{html}");
         assert!(html.contains("d=\"M10 1M20 5\""), "{html}");
+        // Upwards is more: the inner picture is turned over, as its range is.
+        assert!(html.contains("<g transform=\"scale(1 -1)\""), "{html}");
         assert!(html.contains("data-x=\"10 20\" data-y=\"1 5\""), "{html}");
         assert!(sheet(vec![panel], 1, false).contains("d=\"M10 1M20 5\""));
+    }
+
+    #[test]
+    fn what_is_written_into_a_cell_stands_in_its_middle() {
+        let (x, y) = ((0.0, 10.0), (0.0, 4.0));
+        let cell = HeatCell { x, y, colour: palette::GAP, name: "n".into(), text: "in".into() };
+        let panel = Panel { x, y: Some(y), cells: vec![cell], ..Panel::default() };
+        let html = panel.figure("", (540, 250), "name");
+        let inner = |name: &str| -> f64 {
+            let (_, rest) = html.split_once(" class=\"data\"").expect("an inner picture");
+            let (_, value) = rest.split_once(&format!(" {name}=\"")).expect("an attribute");
+            value.split('"').next().and_then(|text| text.parse().ok()).expect("a number")
+        };
+        let at = inner("x") + 0.5 * inner("width");
+        assert!(html.contains(&format!("<text x=\"{at:.1}\"")) && html.contains(">in<"), "{html}");
     }
 
     #[test]
