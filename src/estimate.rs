@@ -19,6 +19,7 @@ mod state;
 mod steps;
 pub mod tread;
 pub mod vibration;
+mod wind_up;
 
 use crate::model::corner_profile::CornerProfile;
 use crate::numeric::{LowPass, checked};
@@ -26,6 +27,7 @@ use crate::rig::{Rig, RigError};
 use creep::Creep;
 use crossing::CrossingWatch;
 use tread::Tread;
+use wind_up::Shear;
 
 pub use follow::Follow;
 pub use position::{Place, Position, PositionConfidence};
@@ -70,6 +72,7 @@ pub struct Estimator {
     /// The same of a wheel in the middle of its life.
     worn: Ratio,
     creep: Creep,
+    shear: Shear,
 }
 
 impl Estimator {
@@ -96,6 +99,7 @@ impl Estimator {
                 0.5 * rig.rig.wheel_wear_mm / rig.rig.wheel_radius_mm,
             )?,
             creep: Creep::try_build(rig)?,
+            shear: Shear::try_build(rig)?,
         })
     }
 

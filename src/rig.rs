@@ -7,6 +7,7 @@
 
 mod abilities;
 mod presets;
+pub mod shear;
 mod validate;
 
 pub use abilities::OVERPRESSURE_PART;
@@ -88,6 +89,9 @@ pub struct Tread {
     pub stiffening: f64,
     /// Relaxation time tau, s.
     pub tau_s: f64,
+    /// Thickness of the rubber, mm, by which it gives way along the wall; 0: not at all, but for
+    /// `plant.elastic_creep`.
+    pub thickness_mm: f64,
 }
 
 /// Loads and friction.

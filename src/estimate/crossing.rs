@@ -167,6 +167,8 @@ pub struct WatchInput {
     pub over: bool,
     /// The wheel is clear of the step behind; none where only the ground can show that.
     pub clear: Option<bool>,
+    /// Compression by the lower wall at which the tread's memory lets go of it, mm, if that is known.
+    pub short: Option<Millimetres>,
 }
 
 impl CrossingWatch {
@@ -313,6 +315,23 @@ impl CrossingWatch {
         }
     }
 
+    /// Whether the wheel is on a wall, far from any edge.
+    pub fn is_level(&self, state: &WatchState, direction: Direction, seen: &WatchInput) -> bool {
+        state.contact == Contact::Wall && self.rise(state, direction, seen).abs() < HOLD
+    }
+
+    /// Compression by the wall, or beside a corner by the lower one, mm.
+    pub fn floor(
+        &self,
+        state: &WatchState,
+        direction: Direction,
+        seen: &WatchInput,
+    ) -> Millimetres {
+        let dropped = direction == Direction::Retract && state.contact != Contact::Wall;
+        let wall = state.baseline.output() + if dropped { self.step } else { Q16::ZERO };
+        (seen.radius - wall).max(Q16::ZERO)
+    }
+
     /// One tick.
     pub fn step(
         &self,
@@ -374,10 +393,10 @@ impl CrossingWatch {
     ) -> Option<CrossingEvent> {
         // Height of the centre that the tread's memory still lacks at this instant.
         let short = match direction {
-            Direction::Deploy => {
+            Direction::Deploy => seen.short.unwrap_or_else(|| {
                 let flat = state.flat.max(Q16::ZERO);
                 (flat * self.memory).min(sqrt(flat * (self.radius + self.radius)) * self.most_kept)
-            }
+            }),
             Direction::Retract => Q16::ZERO,
         };
         let free = match direction {

@@ -18,7 +18,12 @@ impl Rig {
                 arm_length_mm: 145.0,
                 arm_pivot_radius_mm: 20.0,
             },
-            tread: Tread { k_inf_pa_per_m: 0.6044e9, stiffening: 4.2235, tau_s: 0.1059 },
+            tread: Tread {
+                k_inf_pa_per_m: 0.6044e9,
+                stiffening: 4.2235,
+                tau_s: 0.1059,
+                thickness_mm: 0.0,
+            },
             plant: Loads {
                 mu: 1.1,
                 top_load_n: 20.0,

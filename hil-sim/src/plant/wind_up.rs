@@ -5,17 +5,13 @@
 //! the contact: the displacement is lost over the relaxation length, the memory over half the
 //! length of the contact, the mean age of the rubber in it.
 
-use std::f64::consts::{PI, TAU};
+use interstage::rig::shear;
 
 use super::ring::RingParameters;
 
 /// Thickness for a tread of independent elements, mm: its layer has the gaps nearest to theirs.
 /// Chosen, as the thickness is not published.
 pub const NOMINAL_THICKNESS_MM: f64 = 8.0;
-
-/// Length of the contact that the stiffness is taken at, mm: the corner's at 33 to 50 N, where
-/// traction is largest. The wall's is twice as long and 1.2 times as stiff.
-const REFERENCE_MM: f64 = 2.5;
 
 /// Rubber between rim and hub, displaced along the wall.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -54,20 +50,12 @@ pub struct Winding {
 
 impl Shear {
     /// The layer of this wheel, `compliance` times as compliant; 0: rigid.
-    ///
-    /// Incompressible rubber of thickness t and width L, bonded to the hub, on a contact of length
-    /// a under elliptic pressure and traction in proportion to it, G its relaxed shear modulus:
-    /// `G L / k = ln(1 + 9.9 t/a) / 2 pi + ((1 - t/R)^-2 - 1) / 4 pi + 0.22 t/R`, the compliance of
-    /// a flat layer, the rim's rotation on the hub, and the curvature. Within 2 % of the sum over
-    /// the waves of the layer (`ring::layer`), at 2.5 mm and from 3 to 16 mm thick. Steady creep
-    /// is that of a half-space, `F / (pi G L a)` (Johnson, Contact Mechanics, 8.3).
     pub fn of(ring: &RingParameters, compliance: f64) -> Self {
         let thickness = ring.thickness_mm();
-        let per_modulus = ring.width_mm / compliance_of(ring.radius_mm, thickness, REFERENCE_MM);
-        let n_per_mm = modulus(ring, thickness) * per_modulus / compliance;
+        let layer = shear::Shear::of_layer(ring.radius_mm, ring.width_mm, thickness, ring.k_inf);
         Self {
-            n_per_mm,
-            relaxation_lengths: PI * ring.width_mm / per_modulus,
+            n_per_mm: layer.n_per_mm / compliance,
+            relaxation_lengths: layer.relaxation_lengths,
             stiffening: ring.k_0 / ring.k_inf,
             relaxations_s: ring.relaxations_s(),
         }
@@ -91,21 +79,6 @@ impl RingParameters {
     fn thickness_mm(&self) -> f64 {
         if self.is_coupled() { self.tread_thickness_mm } else { NOMINAL_THICKNESS_MM }
     }
-}
-
-/// Relaxed shear modulus, N/mm^2, that gives the ring's gap at 100 N: within 2 % of
-/// `ring::layer::modulus_mm` from 3 to 16 mm thick.
-fn modulus(ring: &RingParameters, thickness_mm: f64) -> f64 {
-    let thin = 1.0 + (2.27 / thickness_mm).powi(3);
-    ring.k_inf * 0.1096 * thickness_mm / (thin * (1.0 + 0.0052 * thickness_mm))
-}
-
-/// Displacement of the rim in the contact per traction, times `G L`.
-fn compliance_of(radius_mm: f64, thickness_mm: f64, contact_mm: f64) -> f64 {
-    let part = thickness_mm / radius_mm;
-    let layer = (9.9 * thickness_mm / contact_mm).ln_1p() / TAU;
-    let rotation = ((1.0 - part).powi(-2) - 1.0) / (2.0 * TAU);
-    layer + rotation + 0.22 * part
 }
 
 impl WindUp {
@@ -162,6 +135,10 @@ mod tests {
     use super::*;
     use crate::plant::ring::layer::{modulus_mm, shear_compliance};
     use interstage::rig::Rig;
+    use interstage::rig::shear::{compliance_of, modulus};
+    use std::f64::consts::{PI, TAU};
+
+    const REFERENCE_MM: f64 = 2.5;
 
     fn ring(thickness_mm: f64) -> RingParameters {
         RingParameters {
@@ -206,7 +183,7 @@ mod tests {
             let off = compliance_of(25.0, thickness, REFERENCE_MM) / exact - 1.0;
             assert!(off.abs() < 0.02, "{thickness}: {off}");
             let rubber = ring(thickness);
-            let off = modulus(&rubber, thickness) / (rubber.k_inf * modulus_mm(&rubber)) - 1.0;
+            let off = modulus(thickness, rubber.k_inf) / (rubber.k_inf * modulus_mm(&rubber)) - 1.0;
             assert!(off.abs() < 0.02, "{thickness}: {off}");
         }
     }

@@ -55,6 +55,7 @@ mod tests {
             near: false,
             over: false,
             clear: Some(true),
+            short: None,
         }
     }
 
