@@ -30,15 +30,11 @@ pub(crate) use console::Console;
 pub(crate) use flash::ParameterFlash;
 pub(crate) use guard::Guard;
 #[cfg(feature = "hil")]
-pub(crate) use hil::{
-    Angle, Bridges, Button, CompressionSensor, PreloadSensor, Wheel, paused, split,
-};
+pub(crate) use hil::{Analog, Angle, Bridges, Button, Wheel, paused, split};
 pub(crate) use light::Lamp;
 pub(crate) use line::HostLine;
 #[cfg(not(feature = "hil"))]
-pub(crate) use pins::{
-    Angle, Bridges, Button, CompressionSensor, PreloadSensor, Wheel, paused, split,
-};
+pub(crate) use pins::{Analog, Angle, Bridges, Button, Wheel, paused, split};
 pub(crate) use text_log::TextLog;
 
 use embassy_stm32::interrupt::{Interrupt, InterruptExt, Priority};
@@ -46,6 +42,7 @@ use embassy_stm32::peripherals::{DMA1_CH1, DMA1_CH2};
 use embassy_stm32::{
     Config, Peripherals, bind_interrupts, dma, exti, flash as flash_driver, interrupt, rcc,
 };
+use interstage::sense::raw::SensorId;
 use interstage::tasks::Exchange;
 use registers::{Cr5, PWR};
 
@@ -55,8 +52,8 @@ pub(crate) static EXCHANGE: Exchange = Exchange::new();
 /// The board taken apart: each task owns what it uses and nothing else.
 pub(crate) struct Parts {
     pub(crate) wheel_encoder: Wheel,
-    pub(crate) preload_sensor: PreloadSensor,
-    pub(crate) compression_sensor: CompressionSensor,
+    /// By [`SensorId::ANALOG`].
+    pub(crate) analog: [Analog; SensorId::ANALOG.len()],
     pub(crate) arm_angle: Angle,
     pub(crate) motors: Bridges,
     pub(crate) watchdog: Guard,

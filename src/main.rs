@@ -21,6 +21,7 @@ mod firmware {
     use interstage::log::{Identity, LogEncoder};
     use interstage::model::Planner;
     use interstage::params::service::Service;
+    use interstage::sense::raw::SensorId;
     use interstage::tasks::{self, TickIo, TickIoCell};
     use interstage::tick::{Controller, Entry, Event};
     use static_cell::{ConstStaticCell, StaticCell};
@@ -28,8 +29,8 @@ mod firmware {
     use crate::board::config::{self, HoldReason};
     use crate::board::rtt::{self, Channels};
     use crate::board::{self, EXCHANGE, flash_page, guard, image, light, safety, start, supply};
-    use crate::board::{Angle, Bridges, Button, Console, Guard, HostLine, Lamp, Parts, TextLog};
-    use crate::board::{CompressionSensor, ParameterFlash, PreloadSensor, Wheel};
+    use crate::board::{Analog, Angle, Bridges, Button, Console, Guard, HostLine, Lamp, Parts};
+    use crate::board::{ParameterFlash, TextLog, Wheel};
 
     static LATEST: StaticCell<TickIoCell> = StaticCell::new();
     static ENCODER: ConstStaticCell<LogEncoder> =
@@ -112,8 +113,9 @@ mod firmware {
         let latest = LATEST.init_with(|| TickIoCell::new(TickIo::default()));
         control.spawn(clock().unwrap());
         control.spawn(wheel_encoder(parts.wheel_encoder).unwrap());
-        control.spawn(preload_sensor(parts.preload_sensor).unwrap());
-        control.spawn(compression_sensor(parts.compression_sensor).unwrap());
+        let [preload, compression] = parts.analog;
+        control.spawn(preload_sensor(preload).unwrap());
+        control.spawn(compression_sensor(compression).unwrap());
         control.spawn(arm_angle(parts.arm_angle).unwrap());
         control.spawn(motors(parts.motors, parts.watchdog, controller, latest).unwrap());
         control.spawn(record(latest).unwrap());
@@ -136,8 +138,10 @@ mod firmware {
     tasks! {
         clock() => tasks::clock(&EXCHANGE);
         wheel_encoder(wheel: Wheel) => tasks::wheel_encoder(wheel, &EXCHANGE);
-        preload_sensor(input: PreloadSensor) => tasks::preload_sensor(input, &EXCHANGE);
-        compression_sensor(input: CompressionSensor) => tasks::compression_sensor(input, &EXCHANGE);
+        preload_sensor(input: Analog) => tasks::analog(SensorId::PreloadSensor, input, &EXCHANGE);
+        compression_sensor(input: Analog) => {
+            tasks::analog(SensorId::CompressionSensor, input, &EXCHANGE)
+        };
         arm_angle(bus: Angle) => tasks::arm_angle(bus, &EXCHANGE);
         motors(
             motors: Bridges, watchdog: Guard, controller: &'static Controller,

@@ -14,16 +14,14 @@ use rtt_target::DownChannel;
 use super::registers::{ADC1, ADC2, ADC3, DMA1, TIM1, TIM8};
 use super::rtt::Frames;
 use super::{Console, Guard, Lamp, ParameterFlash, Parts, TextLog};
-use analog::{Analog, Ring};
+pub(crate) use analog::Analog;
+use analog::Ring;
 pub(crate) use angle::Angle;
 use bridge::Bridge;
 pub(crate) use bridge::Bridges;
 pub(crate) use button::Button;
 use readback::Readback;
 pub(crate) use wheel::Wheel;
-
-pub(crate) type PreloadSensor = Analog;
-pub(crate) type CompressionSensor = Analog;
 
 static PRELOAD_SENSOR: Ring = Ring::new();
 static COMPRESSION_SENSOR: Ring = Ring::new();
@@ -39,18 +37,10 @@ pub(crate) fn split(
 ) -> (Parts, Peri<'static, AnyPin>, ParameterFlash) {
     let parts = Parts {
         wheel_encoder: Wheel::new(p.TIM5, p.PA0, p.PA1),
-        preload_sensor: Analog::new(
-            (p.ADC1, ADC1),
-            p.PC2,
-            (p.DMA1_CH1, DMA1.ch(0)),
-            &PRELOAD_SENSOR,
-        ),
-        compression_sensor: Analog::new(
-            (p.ADC2, ADC2),
-            p.PC3,
-            (p.DMA1_CH2, DMA1.ch(1)),
-            &COMPRESSION_SENSOR,
-        ),
+        analog: [
+            Analog::new((p.ADC1, ADC1), p.PC2, (p.DMA1_CH1, DMA1.ch(0)), &PRELOAD_SENSOR),
+            Analog::new((p.ADC2, ADC2), p.PC3, (p.DMA1_CH2, DMA1.ch(1)), &COMPRESSION_SENSOR),
+        ],
         arm_angle: Angle::new(p.SPI1, (p.PB3, p.PA7, p.PA6), p.PB10),
         motors: Bridges {
             drive: Bridge::new((p.TIM1, TIM1), p.PA8, p.PA9.into(), p.PA10.into(), p.PB12),

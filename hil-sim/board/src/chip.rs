@@ -49,9 +49,9 @@ pub struct Defects {
     pub encoder_swapped: bool,
     /// PWM and enable of the drive's bridge have no pull-down: high while nothing drives them.
     pub drive_bridge_floats: bool,
-    /// Codes, in parts of 2^16, that the inputs of preload sensor, compression sensor, drive's
-    /// and pre-tightener's bridge read instead of their voltages.
-    pub stuck_codes: [Option<u16>; 4],
+    /// Codes, in parts of 2^16, that the inputs of sensors and bridges read instead of their
+    /// voltages.
+    pub stuck_codes: [Option<u16>; pins::ANALOG.len()],
     /// The noise at the analogue inputs is below half a step of 12 bits: each conversion of a mean
     /// gives the same.
     pub quiet_inputs: bool,
@@ -100,7 +100,7 @@ pub struct Chip {
     deselected: bool,
     /// The wheel encoder's position, in quarters of a line pair.
     wheel: i64,
-    inputs: [u16; 4],
+    inputs: [u16; pins::ANALOG.len()],
     bridges: [Bridge; 2],
     /// Faults of the hardware.
     pub defects: Defects,
@@ -142,7 +142,7 @@ impl Chip {
             angle: AngleSensor::default(),
             deselected: false,
             wheel: 0,
-            inputs: [0; 4],
+            inputs: [0; pins::ANALOG.len()],
             bridges: [Bridge::default(); 2],
             defects: Defects::default(),
             locked_up: false,

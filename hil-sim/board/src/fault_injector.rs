@@ -10,7 +10,7 @@
 
 mod save;
 
-use interstage::sense::raw::{AdcCode, Sample, SensorFrame};
+use interstage::sense::raw::{SensorFrame, SensorId};
 
 use super::core::CoreError;
 use super::faults;
@@ -165,35 +165,24 @@ impl BoardInjector {
 
     /// The codes at the pins in tick `now`, from those of sound sensors.
     pub(super) fn sensors(&mut self, machine: &mut Machine, codes: Codes, now: u32) -> Codes {
-        let mut frame = SensorFrame {
-            wheel_encoder: Some(Sample { code: codes.wheel_encoder, at: now }),
-            preload_sensor: Some(Sample { code: codes.preload_sensor, at: now }),
-            compression_sensor: Some(Sample { code: codes.compression_sensor, at: now }),
-            arm_angle: Some(Sample { code: codes.arm_angle, at: now }),
-            bridges: Some(codes.bridges),
-        };
+        let mut frame = SensorFrame::taken(now, codes.sensors);
+        frame.bridges = Some(codes.bridges);
         self.faults.sensors(&mut frame);
-        let bridge = |sample: Option<Sample<AdcCode>>| match sample {
-            Some(sample) if sample.at == now => sample.code,
-            _ => AdcCode::new(0),
-        };
-        let fresh = [frame.wheel_encoder.map(|s| s.at), frame.arm_angle.map(|s| s.at)];
-        let silent = fresh.map(|at| at != Some(now));
+        let fresh = |sensor: SensorId| frame[sensor].filter(|sample| sample.at == now);
+        let silent = [SensorId::WheelEncoder, SensorId::ArmAngle].map(|s| fresh(s).is_none());
         if silent != std::mem::replace(&mut self.silent, silent) {
             let chip = machine.chip_mut();
             chip.defects.encoder_lines = [silent[0]; 2];
             chip.angle.lost = silent[1];
         }
-        Codes {
-            wheel_encoder: frame
-                .wheel_encoder
-                .filter(|_| !silent[0])
-                .map_or(codes.wheel_encoder, |s| s.code),
-            preload_sensor: bridge(frame.preload_sensor),
-            compression_sensor: bridge(frame.compression_sensor),
-            arm_angle: frame.arm_angle.filter(|_| !silent[1]).map_or(codes.arm_angle, |s| s.code),
-            bridges: frame.bridges.unwrap_or_default(),
-        }
+        let sensors = SensorId::ALL.map(|sensor| {
+            let is_analog = SensorId::ANALOG.contains(&sensor);
+            fresh(sensor)
+                .map_or(if is_analog { 0 } else { codes.sensors[sensor as usize] }, |sample| {
+                    sample.code
+                })
+        });
+        Codes { sensors, bridges: frame.bridges.unwrap_or_default() }
     }
 
     /// Noise on the host's line.
