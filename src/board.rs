@@ -38,9 +38,8 @@ pub(crate) use pins::{Analog, Angle, Bridges, Button, Wheel, paused, split};
 pub(crate) use text_log::TextLog;
 
 use embassy_stm32::interrupt::{Interrupt, InterruptExt, Priority};
-use embassy_stm32::peripherals::{DMA1_CH1, DMA1_CH2};
 use embassy_stm32::{
-    Config, Peripherals, bind_interrupts, dma, exti, flash as flash_driver, interrupt, rcc,
+    Config, Peripherals, bind_interrupts, exti, flash as flash_driver, interrupt, rcc,
 };
 use interstage::sense::raw::SensorId;
 use interstage::tasks::Exchange;
@@ -64,8 +63,6 @@ pub(crate) struct Parts {
 }
 
 bind_interrupts!(pub(crate) struct Irqs {
-    DMA1_CHANNEL1 => dma::InterruptHandler<DMA1_CH1>;
-    DMA1_CHANNEL2 => dma::InterruptHandler<DMA1_CH2>;
     FLASH => flash_driver::InterruptHandler;
     EXTI15_10 => exti::InterruptHandler<interrupt::typelevel::EXTI15_10>;
 });

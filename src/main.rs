@@ -43,11 +43,10 @@ mod firmware {
     /// the interrupts above it, which only wake tasks (two DMA channels, button) or count
     /// (system timer), and by critical sections, of which the longest wakes a task in the timer
     /// queue or copies a log entry, 3 us. Those of thread mode run in the middle between two
-    /// ticks or directly after one, see [`tasks::mid_tick_deadline`]. On this executor the four
-    /// sensor tasks delay the tick; the longest exchanges two frames of 3 us, three after an
-    /// error. Model, log and
-    /// operator run in thread mode and are preempted. The tick measures its own lateness, and a
-    /// full period of it is a fault.
+    /// ticks or directly after one, see [`tasks::mid_tick_deadline`]. On this executor the sensors'
+    /// tasks delay the tick; the longest exchanges two frames of 3 us, three after an error. Model,
+    /// log and operator run in thread mode and are preempted. The tick measures its own lateness,
+    /// and a full period of it is a fault.
     static CONTROL: InterruptExecutor = InterruptExecutor::new();
 
     /// The board has no use for UART5; its vector carries [`CONTROL`].
@@ -113,9 +112,9 @@ mod firmware {
         let latest = LATEST.init_with(|| TickIoCell::new(TickIo::default()));
         control.spawn(clock().unwrap());
         control.spawn(wheel_encoder(parts.wheel_encoder).unwrap());
-        let [preload, compression] = parts.analog;
-        control.spawn(preload_sensor(preload).unwrap());
-        control.spawn(compression_sensor(compression).unwrap());
+        for (sensor, input) in SensorId::ANALOG.into_iter().zip(parts.analog) {
+            control.spawn(analog(sensor, input).unwrap());
+        }
         control.spawn(arm_angle(parts.arm_angle).unwrap());
         control.spawn(motors(parts.motors, parts.watchdog, controller, latest).unwrap());
         control.spawn(record(latest).unwrap());
@@ -127,8 +126,8 @@ mod firmware {
 
     /// Makes executor tasks, which cannot be generic, of the library's functions.
     macro_rules! tasks {
-        ($($name:ident($($part:ident: $type:ty),*) => $call:expr;)*) => {$(
-            #[embassy_executor::task]
+        ($($name:ident $([$most:expr])? ($($part:ident: $type:ty),*) => $call:expr;)*) => {$(
+            #[embassy_executor::task$((pool_size = $most))?]
             async fn $name($($part: $type),*) -> ! {
                 $call.await
             }
@@ -138,9 +137,8 @@ mod firmware {
     tasks! {
         clock() => tasks::clock(&EXCHANGE);
         wheel_encoder(wheel: Wheel) => tasks::wheel_encoder(wheel, &EXCHANGE);
-        preload_sensor(input: Analog) => tasks::analog(SensorId::PreloadSensor, input, &EXCHANGE);
-        compression_sensor(input: Analog) => {
-            tasks::analog(SensorId::CompressionSensor, input, &EXCHANGE)
+        analog[SensorId::ANALOG.len()](sensor: SensorId, input: Analog) => {
+            tasks::analog(sensor, input, &EXCHANGE)
         };
         arm_angle(bus: Angle) => tasks::arm_angle(bus, &EXCHANGE);
         motors(

@@ -36,9 +36,9 @@ const WHEEL: [Carried; 2] = [(Pin(0, 0), 2), (Pin(0, 1), 2)];
 const ANGLE: [Carried; 3] = [(Pin(1, 3), 5), (Pin(0, 6), 5), (Pin(0, 7), 5)];
 /// Sensors at analogue inputs.
 const SENSORS: usize = SensorId::ANALOG.len();
-/// Analogue inputs: pin and channel of ADC1 and of ADC2, then two of ADC3.
-pub(super) const ANALOG: [(Pin, usize); SENSORS + 2] =
-    [(Pin(2, 2), 8), (Pin(2, 3), 9), (Pin(1, 0), 12), (Pin(1, 1), 1)];
+/// Analogue inputs of the sensors, then of the bridges: pin, converter (0 is ADC1) and its channel.
+pub(super) const ANALOG: [(Pin, usize, usize); SENSORS + 2] =
+    [(Pin(2, 2), 0, 8), (Pin(2, 3), 1, 9), (Pin(1, 0), 2, 12), (Pin(1, 1), 2, 1)];
 
 /// Wiring of a motor's bridge.
 struct Wired {
@@ -197,16 +197,13 @@ impl Chip {
     }
 
     fn apply_analog(&mut self) {
-        for (input, (pin, channel)) in ANALOG.into_iter().enumerate() {
+        for (input, (pin, converter, channel)) in ANALOG.into_iter().enumerate() {
             let wired = self.role(pin) == Role::Analog;
             let voltage = if wired { self.inputs[input] } else { 0 };
             let voltage = self.defects.stuck_codes[input].unwrap_or(voltage);
             // What all conversions of a mean read as the same is a step of theirs.
             let voltage = if self.defects.quiet_inputs { voltage & !0xF } else { voltage };
-            match input {
-                0..SENSORS => self.adc.set_input(input, channel, voltage),
-                _ => self.readback.set_input(0, channel, voltage),
-            }
+            self.adcs[converter / 2].set_input(converter % 2, channel, voltage);
         }
     }
 
