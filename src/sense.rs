@@ -3,12 +3,17 @@
 //! the tick.
 //!
 //! # A new sensor
-//! Log, columns, messages of the loop, faults of a scenario and images follow from its line in
-//! `sensors` in `src/sense/raw.rs`. Beside it, for a converter's code that is logged:
-//! 1. `src/board/pins.rs` (its driver) and `src/main.rs` (its task); with a converter of its own
-//!    `src/board.rs` (its interrupt) and `src/board/registers.rs`;
-//! 2. `hil-sim/src/plant/sensors.rs`: what it measures, its code, its noise;
-//! 3. `hil-sim/board/src/chip/pins.rs`: its pin on the emulated board.
+//! Task, log, columns, messages of the loop, faults of a scenario and images follow from its entry
+//! in `sensors` in `src/sense/raw.rs`. One at a converter of its own, whose code is logged, is in
+//! four files:
+//! 1. `src/sense/raw.rs`: its entry, and its place in [`SensorId::ANALOG`](raw::SensorId::ANALOG);
+//! 2. `src/board/pins.rs`: converter, pin, DMA channel and interrupt;
+//! 3. `hil-sim/src/plant/sensors.rs`: what it measures, its code, its noise;
+//! 4. `hil-sim/board/src/chip/pins.rs`: its pin on the emulated board, which has ADC1 to ADC4.
+//!
+//! Tests ask for its columns in `docs/LOGGING.md`, and for the runs in `hil-sim/tests/data` again.
+//! A bus or counter of another kind has a driver in `src/board/pins/`, a part in `src/board.rs`, a
+//! task in `src/tasks/sensors.rs` and `src/main.rs`, and a model on the emulated board.
 //!
 //! One that the controller uses has its parameters in `src/rig.rs`, its quantity in
 //! `src/sense/senses.rs`, and the faults of a silent one in `src/fault.rs`,

@@ -104,8 +104,8 @@ pub struct Sample<T> {
 }
 
 /// Passes the sensors to the macro `$then`, behind what else it is given: each with its text, its
-/// name and that in a scenario's faults, the ticks from one reading to the next, and its columns in the log: the code, what may be
-/// wrong with it, and the tick at which it was taken.
+/// name and that in a scenario's faults, the ticks from one reading to the next, and its columns in
+/// the log: the code, what may be wrong with it, and the tick at which it was taken.
 ///
 /// The order is that of codes in frames and messages, of the tasks, and of the bits of
 /// [`MissedCheckIns`](crate::restart::MissedCheckIns).
@@ -114,13 +114,17 @@ macro_rules! sensors {
     ($then:ident $($given:tt)*) => {
         $then! { $($given)*
             /// Wheel encoder: its counter, 16 bits, wraps.
-            WheelEncoder "wheel encoder" "encoder", 1: wheel_encoder_code, wheel_encoder_at;
+            WheelEncoder "wheel encoder" "encoder", 1:
+                wheel_encoder_code, wheel_encoder_at;
             /// Preload sensor between pre-tightener and arm: code of the converter.
-            PreloadSensor "preload sensor" "preload-sensor", 1: preload_code, preload_at;
+            PreloadSensor "preload sensor" "preload-sensor", 1:
+                preload_code, preload_at;
             /// Compression sensor of the tread, between arm and wheel: code of the converter.
-            CompressionSensor "compression sensor" "compression-sensor", 1: compression_code, compression_at;
+            CompressionSensor "compression sensor" "compression-sensor", 1:
+                compression_code, compression_at;
             /// Arm angle sensor at the pillar: its 14-bit code, 16384 a turn.
-            ArmAngle "arm angle" "angle", 2: arm_angle_code (arm_angle_error), arm_angle_at;
+            ArmAngle "arm angle" "angle", 2:
+                arm_angle_code (arm_angle_error), arm_angle_at;
         }
     };
 }

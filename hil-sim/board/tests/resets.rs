@@ -72,10 +72,10 @@ fn a_hard_fault_is_reported_with_where_and_why() {
     assert!(restart.snapshot.is_some());
 }
 
-/// Tasks by their functions in `main.rs`, their names in the record, and cycles into the middle
-/// of a poll.
+/// Tasks by their functions in `main.rs`, those of converters by their sensors, their names in the
+/// record, and cycles into the middle of a poll, before the task checks in.
 const TASKS: [(&str, &str, u64); 8] = [
-    ("wheel_encoder", "wheel encoder", 90),
+    ("wheel_encoder", "wheel encoder", 60),
     ("preload_sensor", "preload sensor", 130),
     ("compression_sensor", "compression sensor", 130),
     ("arm_angle", "arm angle", 60),
