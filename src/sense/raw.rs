@@ -167,9 +167,13 @@ pub struct SensorFrame {
 }
 
 impl SensorFrame {
-    /// Codes of all sensors, by [`SensorId`], taken at the same tick.
-    pub fn taken(at: Tick, codes: [u16; SensorId::COUNT]) -> Self {
-        Self { samples: codes.map(|code| Some(Sample { code, at })), bridges: None }
+    /// Codes of the first sensors, by [`SensorId`], taken at the same tick; none of the others.
+    pub fn taken<const N: usize>(at: Tick, codes: [u16; N]) -> Self {
+        let mut frame = Self::default();
+        for (sample, code) in frame.samples.iter_mut().zip(codes) {
+            *sample = Some(Sample { code, at });
+        }
+        frame
     }
 
     /// The latest code of a sensor as its type, of which `new` makes one.

@@ -275,10 +275,11 @@ proptest! {
                 arm.map(|(code, age)| (angle(code), age)),
             ];
             let drive = bridges.map(|drive| drive.unwrap_or(sound.drive));
-            let sensors = SensorFrame {
-                samples: codes.map(|code| code.map(|(code, age)| Sample { code, at: at(age) })),
-                bridges: drive.map(|drive| BridgeCodes { drive, ..sound }),
-            };
+            let bridges = drive.map(|drive| BridgeCodes { drive, ..sound });
+            let mut sensors = SensorFrame { bridges, ..SensorFrame::default() };
+            for (sample, code) in sensors.samples.iter_mut().zip(codes) {
+                *sample = code.map(|(code, age)| Sample { code, at: at(age) });
+            }
             let input = Input {
                 now,
                 sensors,

@@ -199,17 +199,11 @@ impl Board {
         let planner = forever(Planner::try_build(&scenario.rig).expect("a sound rig"));
         let latest = forever(TickIoCell::new(TickIo::default()));
         let part = || Peripheral(Rc::clone(&self.shared));
-        let [preload, compression] =
-            SensorId::ANALOG.map(|sensor| Converter(Rc::clone(&self.shared), sensor));
         let (wheel, arm, button) = (part(), part(), part());
         let (motors, watchdog, journal, light) = (part(), part(), part(), part());
         self.tasks = vec![
             Box::pin(async { tasks::clock(exchange).await }),
             Box::pin(async { tasks::wheel_encoder(wheel, exchange).await }),
-            Box::pin(async { tasks::analog(SensorId::PreloadSensor, preload, exchange).await }),
-            Box::pin(async {
-                tasks::analog(SensorId::CompressionSensor, compression, exchange).await
-            }),
             Box::pin(async { tasks::arm_angle(arm, exchange).await }),
             Box::pin(async { tasks::operator(button, exchange).await }),
             Box::pin(async { tasks::motors(motors, watchdog, controller, latest, exchange).await }),
@@ -220,8 +214,13 @@ impl Board {
                 tasks::journal(journal, light, &mut encoder, exchange).await
             }),
         ];
+        for sensor in SensorId::ANALOG {
+            let input = Converter(Rc::clone(&self.shared), sensor);
+            let task = Box::pin(async move { tasks::analog(sensor, input, exchange).await });
+            self.tasks.insert(1 + sensor as usize, task);
+        }
         if order == Order::TickFirst {
-            self.tasks[1..7].rotate_right(1);
+            self.tasks[1..SensorId::COUNT + 3].rotate_right(1);
         }
     }
 
