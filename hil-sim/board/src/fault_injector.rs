@@ -28,8 +28,8 @@ use interstage::rig::Rig;
 use save::Save;
 pub(crate) use save::Saving;
 
-/// Cycles into its poll at which a task hangs.
-const INTO_POLL: u64 = 100;
+/// Cycles into its poll at which a task hangs, before the shortest checks in.
+const INTO_POLL: u64 = 60;
 /// Milliseconds to wait for one poll function before the next is tried.
 const PATIENCE: u32 = 20;
 
