@@ -235,11 +235,13 @@ struct TaskSearch {
     /// Poll functions, of which one belongs to the task.
     places: Vec<u32>,
     tried: u32,
+    /// Tasks of a pool that came in its place.
+    others: usize,
 }
 
 impl TaskSearch {
     fn new(machine: &Machine, task: &'static str) -> Self {
-        Self { task, places: machine.tasks.polls().to_vec(), tried: 0 }
+        Self { task, places: machine.tasks.polls().to_vec(), tried: 0, others: 0 }
     }
 
     /// Runs to this cycle at most; returns whether the task hangs.
@@ -257,7 +259,12 @@ impl TaskSearch {
                 machine.hang()?;
                 return Ok(true);
             }
-            self.places.remove(0);
+            machine.run_on(machine.now() + 1)?;
+            self.others += 1;
+            if self.others == SensorId::ANALOG.len() {
+                self.others = 0;
+                self.places.remove(0);
+            }
         }
         Ok(false)
     }
