@@ -177,10 +177,8 @@ impl BoardInjector {
         }
         let sensors = SensorId::ALL.map(|sensor| {
             let is_analog = SensorId::ANALOG.contains(&sensor);
-            fresh(sensor)
-                .map_or(if is_analog { 0 } else { codes.sensors[sensor as usize] }, |sample| {
-                    sample.code
-                })
+            let lost = if is_analog { 0 } else { codes.sensors[sensor as usize] };
+            fresh(sensor).map_or(lost, |sample| sample.code)
         });
         Codes { sensors, bridges: frame.bridges.unwrap_or_default() }
     }
