@@ -40,7 +40,6 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
             eprintln!("[{t_s:8.3}] {:<5} {}", line.level, line.text);
         }
     };
-    // Counting takes two thirds of the speed.
     let wait_states = args.verbose || args.json;
     let options = RunOptions { rows: directory.is_some(), wait_states };
     let ran = {
