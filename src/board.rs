@@ -30,22 +30,18 @@ pub(crate) use console::Console;
 pub(crate) use flash::ParameterFlash;
 pub(crate) use guard::Guard;
 #[cfg(feature = "hil")]
-pub(crate) use hil::{
-    Angle, Bridges, Button, CompressionSensor, PreloadSensor, Wheel, paused, split,
-};
+pub(crate) use hil::{Analog, Angle, Bridges, Button, Wheel, paused, split};
 pub(crate) use light::Lamp;
 pub(crate) use line::HostLine;
 #[cfg(not(feature = "hil"))]
-pub(crate) use pins::{
-    Angle, Bridges, Button, CompressionSensor, PreloadSensor, Wheel, paused, split,
-};
+pub(crate) use pins::{Analog, Angle, Bridges, Button, Wheel, paused, split};
 pub(crate) use text_log::TextLog;
 
 use embassy_stm32::interrupt::{Interrupt, InterruptExt, Priority};
-use embassy_stm32::peripherals::{DMA1_CH1, DMA1_CH2};
 use embassy_stm32::{
-    Config, Peripherals, bind_interrupts, dma, exti, flash as flash_driver, interrupt, rcc,
+    Config, Peripherals, bind_interrupts, exti, flash as flash_driver, interrupt, rcc,
 };
+use interstage::sense::raw::SensorId;
 use interstage::tasks::Exchange;
 use registers::{Cr5, PWR};
 
@@ -55,8 +51,8 @@ pub(crate) static EXCHANGE: Exchange = Exchange::new();
 /// The board taken apart: each task owns what it uses and nothing else.
 pub(crate) struct Parts {
     pub(crate) wheel_encoder: Wheel,
-    pub(crate) preload_sensor: PreloadSensor,
-    pub(crate) compression_sensor: CompressionSensor,
+    /// By [`SensorId::ANALOG`].
+    pub(crate) analog: [Analog; SensorId::ANALOG.len()],
     pub(crate) arm_angle: Angle,
     pub(crate) motors: Bridges,
     pub(crate) watchdog: Guard,
@@ -67,8 +63,6 @@ pub(crate) struct Parts {
 }
 
 bind_interrupts!(pub(crate) struct Irqs {
-    DMA1_CHANNEL1 => dma::InterruptHandler<DMA1_CH1>;
-    DMA1_CHANNEL2 => dma::InterruptHandler<DMA1_CH2>;
     FLASH => flash_driver::InterruptHandler;
     EXTI15_10 => exti::InterruptHandler<interrupt::typelevel::EXTI15_10>;
 });

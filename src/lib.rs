@@ -17,7 +17,7 @@
 //!
 //! ```
 //! use interstage::rig::Rig;
-//! use interstage::sense::raw::{AdcCode, AngleFrame, EncoderCount, Sample, SensorFrame};
+//! use interstage::sense::raw::SensorFrame;
 //! use interstage::tick::{Controller, Input, State};
 //!
 //! // The rig, once: a parameter that is out of range is refused here.
@@ -30,14 +30,9 @@
 //! let arm = (arm_rad / core::f64::consts::TAU * 16384.0 + rig.sense.angle_zero_code).round() as u16;
 //! let parity = (arm.count_ones() % 2) as u16;
 //! // Five per cent of the converter's range is zero.
-//! let unloaded = AdcCode::new(3277);
-//! let frame = |at| SensorFrame {
-//!     wheel_encoder: Some(Sample { code: EncoderCount::new(0), at }),
-//!     preload_sensor: Some(Sample { code: unloaded, at }),
-//!     compression_sensor: Some(Sample { code: unloaded, at }),
-//!     arm_angle: Some(Sample { code: AngleFrame::new(arm | parity << 15), at }),
-//!     bridges: None,
-//! };
+//! let unloaded = 3277;
+//! // Wheel encoder, preload sensor, compression sensor, arm angle.
+//! let frame = |at| SensorFrame::taken(at, [0, unloaded, unloaded, arm | parity << 15]);
 //!
 //! // Without a command nothing moves, whatever the sensors say.
 //! for now in 0..100 {

@@ -21,6 +21,7 @@ mod firmware {
     use interstage::log::{Identity, LogEncoder};
     use interstage::model::Planner;
     use interstage::params::service::Service;
+    use interstage::sense::raw::SensorId;
     use interstage::tasks::{self, TickIo, TickIoCell};
     use interstage::tick::{Controller, Entry, Event};
     use static_cell::{ConstStaticCell, StaticCell};
@@ -28,8 +29,8 @@ mod firmware {
     use crate::board::config::{self, HoldReason};
     use crate::board::rtt::{self, Channels};
     use crate::board::{self, EXCHANGE, flash_page, guard, image, light, safety, start, supply};
-    use crate::board::{Angle, Bridges, Button, Console, Guard, HostLine, Lamp, Parts, TextLog};
-    use crate::board::{CompressionSensor, ParameterFlash, PreloadSensor, Wheel};
+    use crate::board::{Analog, Angle, Bridges, Button, Console, Guard, HostLine, Lamp, Parts};
+    use crate::board::{ParameterFlash, TextLog, Wheel};
 
     static LATEST: StaticCell<TickIoCell> = StaticCell::new();
     static ENCODER: ConstStaticCell<LogEncoder> =
@@ -42,11 +43,10 @@ mod firmware {
     /// the interrupts above it, which only wake tasks (two DMA channels, button) or count
     /// (system timer), and by critical sections, of which the longest wakes a task in the timer
     /// queue or copies a log entry, 3 us. Those of thread mode run in the middle between two
-    /// ticks or directly after one, see [`tasks::mid_tick_deadline`]. On this executor the four
-    /// sensor tasks delay the tick; the longest exchanges two frames of 3 us, three after an
-    /// error. Model, log and
-    /// operator run in thread mode and are preempted. The tick measures its own lateness, and a
-    /// full period of it is a fault.
+    /// ticks or directly after one, see [`tasks::mid_tick_deadline`]. On this executor the sensors'
+    /// tasks delay the tick; the longest exchanges two frames of 3 us, three after an error. Model,
+    /// log and operator run in thread mode and are preempted. The tick measures its own lateness,
+    /// and a full period of it is a fault.
     static CONTROL: InterruptExecutor = InterruptExecutor::new();
 
     /// The board has no use for UART5; its vector carries [`CONTROL`].
@@ -112,8 +112,9 @@ mod firmware {
         let latest = LATEST.init_with(|| TickIoCell::new(TickIo::default()));
         control.spawn(clock().unwrap());
         control.spawn(wheel_encoder(parts.wheel_encoder).unwrap());
-        control.spawn(preload_sensor(parts.preload_sensor).unwrap());
-        control.spawn(compression_sensor(parts.compression_sensor).unwrap());
+        for (sensor, input) in SensorId::ANALOG.into_iter().zip(parts.analog) {
+            control.spawn(analog(sensor, input).unwrap());
+        }
         control.spawn(arm_angle(parts.arm_angle).unwrap());
         control.spawn(motors(parts.motors, parts.watchdog, controller, latest).unwrap());
         control.spawn(record(latest).unwrap());
@@ -125,8 +126,8 @@ mod firmware {
 
     /// Makes executor tasks, which cannot be generic, of the library's functions.
     macro_rules! tasks {
-        ($($name:ident($($part:ident: $type:ty),*) => $call:expr;)*) => {$(
-            #[embassy_executor::task]
+        ($($name:ident $([$most:expr])? ($($part:ident: $type:ty),*) => $call:expr;)*) => {$(
+            #[embassy_executor::task$((pool_size = $most))?]
             async fn $name($($part: $type),*) -> ! {
                 $call.await
             }
@@ -136,8 +137,9 @@ mod firmware {
     tasks! {
         clock() => tasks::clock(&EXCHANGE);
         wheel_encoder(wheel: Wheel) => tasks::wheel_encoder(wheel, &EXCHANGE);
-        preload_sensor(input: PreloadSensor) => tasks::preload_sensor(input, &EXCHANGE);
-        compression_sensor(input: CompressionSensor) => tasks::compression_sensor(input, &EXCHANGE);
+        analog[SensorId::ANALOG.len()](sensor: SensorId, input: Analog) => {
+            tasks::analog(sensor, input, &EXCHANGE)
+        };
         arm_angle(bus: Angle) => tasks::arm_angle(bus, &EXCHANGE);
         motors(
             motors: Bridges, watchdog: Guard, controller: &'static Controller,

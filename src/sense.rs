@@ -3,23 +3,21 @@
 //! the tick.
 //!
 //! # A new sensor
-//! Follow `compression_sensor` from the pin to the log. In this order the compiler names the next
-//! place:
-//! 1. `src/sense/raw.rs` (code), `src/rig.rs` with presets and ranges, `src/sense/senses.rs`
-//!    (quantity, validity, age).
-//! 2. `src/tasks/{sensors,exchange,liveness}.rs`: the task, its slot, its place in `PERIODS` and in
-//!    the names of `src/restart/snapshot.rs`. Sensor tasks come first in `TaskId`, in the order of
-//!    `PERIODS`.
-//! 3. `src/board/pins.rs` and `src/board.rs` (driver and part), the same for the host's loop in
-//!    `src/hal/hil.rs` and `src/board/hil/`, `src/main.rs` (task).
-//! 4. `src/fault.rs`, `src/supervise/{monitor,startup}.rs`, `docs/MODES.md`: the fault of a stale
-//!    reading.
-//! 5. `src/log/{record,delta,identity}.rs` and the columns (`hil-sim/src/record/tick.rs`); `SCHEMA`
-//!    of the parameters where a set changes.
-//! 6. `hil-sim/src/plant/{rig,sensors,spread,draw}.rs` (truth, code, noise),
-//!    `session/closed_loop.rs`, `hil/run.rs`, `injector/sensor.rs`, `scenario/injection`.
-//! 7. The emulated board's input in `hil-sim/board/src/{chip,bench,fault_injector}.rs` and
-//!    `hil-sim/images/src/tick.rs`; the recorded runs.
+//! Task, log, columns, messages of the loop, faults of a scenario and images follow from its entry
+//! in `sensors` in `src/sense/raw.rs`. One at a converter of its own, whose code is logged, is in
+//! four files:
+//! 1. `src/sense/raw.rs`: its entry, and its place in [`SensorId::ANALOG`](raw::SensorId::ANALOG);
+//! 2. `src/board/pins.rs`: converter, pin, DMA channel and interrupt;
+//! 3. `hil-sim/src/plant/sensors.rs`: what it measures, its code, its noise;
+//! 4. `hil-sim/board/src/chip/pins.rs`: its pin on the emulated board, which has ADC1 to ADC4.
+//!
+//! Tests ask for its columns in `docs/LOGGING.md`, and for the runs in `hil-sim/tests/data` again.
+//! A bus or counter of another kind has a driver in `src/board/pins/`, a part in `src/board.rs`, a
+//! task in `src/tasks/sensors.rs` and `src/main.rs`, and a model on the emulated board.
+//!
+//! One that the controller uses has its parameters in `src/rig.rs`, its quantity in
+//! `src/sense/senses.rs`, and the faults of a silent one in `src/fault.rs`,
+//! `src/supervise/monitor.rs` and `docs/MODES.md`.
 
 pub mod analog;
 pub mod angle;

@@ -4,8 +4,7 @@
 //! |---|---|---|
 //! | [`clock()`] | 1 kHz | wakes sensors and control tick at each whole millisecond |
 //! | [`wheel_encoder()`] | 1 kHz | publishes the wheel counter |
-//! | [`preload_sensor()`] | 1 kHz | publishes the preload sensor's code |
-//! | [`compression_sensor()`] | 1 kHz | publishes the compression sensor's code |
+//! | [`analog()`] | 1 kHz | publishes the code of preload or compression sensor |
 //! | [`arm_angle()`] | 500 Hz | publishes the arm sensor's frame |
 //! | [`motors()`] | 1 kHz | the control tick: latest codes in, bridges out |
 //! | [`record()`] | 1 kHz | copies the tick for the log, behind it |
@@ -32,7 +31,7 @@ pub use cycles::TickCycles;
 pub use exchange::{COMMANDS, ENTRIES, Exchange, TickIo};
 pub use liveness::{CHECK_IN_TICKS, TaskId};
 pub use motors::{TickIoCell, motors, record};
-pub use sensors::{SENSOR_TIMEOUT, arm_angle, compression_sensor, preload_sensor, wheel_encoder};
+pub use sensors::{SENSOR_TIMEOUT, analog, arm_angle, wheel_encoder};
 
 use embassy_time::Duration;
 

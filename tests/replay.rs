@@ -13,7 +13,7 @@ use interstage::log::{Flags, Record};
 use interstage::model::{Plan, PlanRequest, Planner};
 use interstage::restart::Restart;
 use interstage::rig::Rig;
-use interstage::sense::raw::SensorFrame;
+use interstage::sense::raw::{SensorFrame, SensorId};
 use interstage::supervise::Mode;
 use interstage::tick::{Controller, Entry, Event, Input, Output, State};
 use interstage::units::Direction;
@@ -116,16 +116,15 @@ fn step_through(
 #[test]
 fn a_sensor_that_never_answers_is_named() {
     let Recorded(boots) = Recorded::read("deploy.mcap");
-    type Silence = fn(&mut SensorFrame);
-    let all: [(Silence, Fault); 4] = [
-        (|sensors| sensors.wheel_encoder = None, Fault::WheelEncoderStale),
-        (|sensors| sensors.preload_sensor = None, Fault::PreloadSensorStale),
-        (|sensors| sensors.compression_sensor = None, Fault::CompressionSensorStale),
-        (|sensors| sensors.arm_angle = None, Fault::ArmAngleStale),
+    let all = [
+        Fault::WheelEncoderStale,
+        Fault::PreloadSensorStale,
+        Fault::CompressionSensorStale,
+        Fault::ArmAngleStale,
     ];
-    for (silence, fault) in all {
+    for (sensor, fault) in SensorId::ALL.into_iter().zip(all) {
         let mut said = None;
-        let silence = |input: &mut Input| silence(&mut input.sensors);
+        let silence = |input: &mut Input| input.sensors[sensor] = None;
         step_through(&boots[0], silence, |_, _, output| {
             assert!(!output.drive.enable && !output.preload.enable, "{fault:?}");
             if let Mode::FaultHold(fault) = output.telemetry.mode {

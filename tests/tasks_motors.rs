@@ -11,6 +11,7 @@ use interstage::log::{Identity, LogEncoder};
 use interstage::model::Planner;
 use interstage::restart::MissedCheckIns;
 use interstage::rig::Rig;
+use interstage::sense::raw::SensorId;
 use interstage::supervise::{Command, Mode};
 use interstage::tasks::{self, CHECK_IN_TICKS, Exchange, TaskId, TickIo, TickIoCell};
 use interstage::tick::{Controller, Entry, Event};
@@ -61,14 +62,10 @@ impl Board {
         let runs = |task| !missing.contains(&task);
         let bench = &mut board.bench;
         bench.spawn(async { tasks::clock(exchange).await });
-        for (task, sensor) in [
-            (TaskId::WheelEncoder, &board.wheel),
-            (TaskId::PreloadSensor, &board.preload_sensor),
-            (TaskId::CompressionSensor, &board.tread),
-            (TaskId::ArmAngle, &board.arm),
-        ] {
-            if runs(task) {
-                spawn(bench, sensor, task, exchange);
+        let parts = [&board.wheel, &board.preload_sensor, &board.tread, &board.arm];
+        for (sensor, part) in SensorId::ALL.into_iter().zip(parts) {
+            if runs(TaskId::Sensor(sensor)) {
+                spawn(bench, part, sensor, exchange);
             }
         }
         let (motors, watchdog) = (board.bridges.clone(), board.watchdog.clone());
@@ -163,10 +160,10 @@ fn start_raises_the_preload_before_the_drive_moves() {
 #[test]
 fn the_watchdog_starves_when_any_task_is_dead_and_the_record_names_it() {
     for (task, name) in [
-        (TaskId::WheelEncoder, "wheel encoder"),
-        (TaskId::PreloadSensor, "preload sensor"),
-        (TaskId::CompressionSensor, "compression sensor"),
-        (TaskId::ArmAngle, "arm angle"),
+        (TaskId::Sensor(SensorId::WheelEncoder), "wheel encoder"),
+        (TaskId::Sensor(SensorId::PreloadSensor), "preload sensor"),
+        (TaskId::Sensor(SensorId::CompressionSensor), "compression sensor"),
+        (TaskId::Sensor(SensorId::ArmAngle), "arm angle"),
         (TaskId::Model, "model"),
         (TaskId::Journal, "journal"),
     ] {

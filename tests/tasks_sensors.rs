@@ -2,8 +2,8 @@
 
 use crate::common::{Answer, Bench, Sensor, forever};
 use embassy_time::Duration;
-use interstage::sense::raw::{AdcCode, AngleFrame, BusFault, EncoderCount, Sample};
-use interstage::tasks::{self, Exchange, SENSOR_TIMEOUT, TaskId};
+use interstage::sense::raw::{BusFault, SensorFrame, SensorId};
+use interstage::tasks::{self, Exchange, SENSOR_TIMEOUT};
 
 /// An exchange whose ticks come.
 fn clocked(bench: &mut Bench) -> &'static Exchange {
@@ -13,42 +13,29 @@ fn clocked(bench: &mut Bench) -> &'static Exchange {
 }
 
 /// Spawns one sensor's task on its part of the exchange.
-pub(crate) fn spawn(bench: &mut Bench, sensor: &Sensor, task: TaskId, exchange: &'static Exchange) {
-    let sensor = sensor.clone();
-    match task {
-        TaskId::WheelEncoder => bench.spawn(async { tasks::wheel_encoder(sensor, exchange).await }),
-        TaskId::PreloadSensor => {
-            bench.spawn(async { tasks::preload_sensor(sensor, exchange).await })
-        }
-        TaskId::CompressionSensor => {
-            bench.spawn(async { tasks::compression_sensor(sensor, exchange).await });
-        }
-        TaskId::ArmAngle => bench.spawn(async { tasks::arm_angle(sensor, exchange).await }),
-        other => panic!("{other:?} is not a sensor"),
+pub(crate) fn spawn(bench: &mut Bench, part: &Sensor, sensor: SensorId, to: &'static Exchange) {
+    let part = part.clone();
+    match sensor {
+        SensorId::WheelEncoder => bench.spawn(async { tasks::wheel_encoder(part, to).await }),
+        SensorId::ArmAngle => bench.spawn(async { tasks::arm_angle(part, to).await }),
+        _ => bench.spawn(async move { tasks::analog(sensor, part, to).await }),
     }
 }
 
 /// Time of the latest sample of a sensor.
-fn latest(exchange: &Exchange, task: TaskId) -> Option<u32> {
-    let frame = exchange.sensors();
-    match task {
-        TaskId::WheelEncoder => frame.wheel_encoder.map(|sample| sample.at),
-        TaskId::PreloadSensor => frame.preload_sensor.map(|sample| sample.at),
-        TaskId::CompressionSensor => frame.compression_sensor.map(|sample| sample.at),
-        TaskId::ArmAngle => frame.arm_angle.map(|sample| sample.at),
-        other => panic!("{other:?} is not a sensor"),
-    }
+fn latest(exchange: &Exchange, sensor: SensorId) -> Option<u32> {
+    exchange.sensors()[sensor].map(|sample| sample.at)
 }
 
-const SENSORS: [(TaskId, u32); 4] = [
-    (TaskId::WheelEncoder, 1),
-    (TaskId::PreloadSensor, 1),
-    (TaskId::CompressionSensor, 1),
-    (TaskId::ArmAngle, 2),
+const SENSORS: [(SensorId, u32); 4] = [
+    (SensorId::WheelEncoder, 1),
+    (SensorId::PreloadSensor, 1),
+    (SensorId::CompressionSensor, 1),
+    (SensorId::ArmAngle, 2),
 ];
 
 /// Those that can fail: a counter cannot.
-const BUSES: [(TaskId, u32); 3] = [SENSORS[1], SENSORS[2], SENSORS[3]];
+const BUSES: [(SensorId, u32); 3] = [SENSORS[1], SENSORS[2], SENSORS[3]];
 
 #[test]
 fn each_sensor_is_read_at_its_own_rate() {
@@ -74,16 +61,18 @@ fn codes_are_published_with_the_tick_at_which_they_were_taken() {
     // A conversion that takes a while is stamped with its beginning.
     sensors[1].takes(Duration::from_micros(500));
     bench.run_ms(10);
-    let frame = exchange.sensors();
-    assert_eq!(frame.wheel_encoder, Some(Sample { code: EncoderCount::new(11), at: 10 }));
-    assert_eq!(frame.preload_sensor, Some(Sample { code: AdcCode::new(22), at: 9 }));
-    assert_eq!(frame.compression_sensor, Some(Sample { code: AdcCode::new(33), at: 10 }));
-    assert_eq!(frame.arm_angle, Some(Sample { code: AngleFrame::new(44), at: 10 }));
+    let mut expected = SensorFrame::taken(10, [11, 22, 33, 44]);
+    let at = |frame: &mut SensorFrame, sensor: SensorId, at| {
+        frame[sensor].iter_mut().for_each(|sample| sample.at = at);
+    };
+    at(&mut expected, SensorId::PreloadSensor, 9);
+    assert_eq!(exchange.sensors(), expected);
     sensors[2].answers(Answer::Code(55));
     bench.run_ms(1);
-    let frame = exchange.sensors();
-    assert_eq!(frame.preload_sensor, Some(Sample { code: AdcCode::new(22), at: 10 }));
-    assert_eq!(frame.compression_sensor, Some(Sample { code: AdcCode::new(55), at: 11 }));
+    expected = SensorFrame::taken(11, [11, 22, 55, 44]);
+    at(&mut expected, SensorId::PreloadSensor, 10);
+    at(&mut expected, SensorId::ArmAngle, 10);
+    assert_eq!(exchange.sensors(), expected);
 }
 
 #[test]
@@ -134,8 +123,8 @@ fn a_hang_of_one_sensor_leaves_the_others_alone() {
     bench.run_ms(10);
     sensors[3].answers(Answer::Hang);
     bench.run_ms(50);
-    assert_eq!(latest(exchange, TaskId::ArmAngle), Some(10));
-    for task in [TaskId::WheelEncoder, TaskId::PreloadSensor, TaskId::CompressionSensor] {
+    assert_eq!(latest(exchange, SensorId::ArmAngle), Some(10));
+    for task in [SensorId::WheelEncoder, SensorId::PreloadSensor, SensorId::CompressionSensor] {
         assert_eq!(latest(exchange, task), Some(60), "{task:?}");
     }
 }
@@ -164,7 +153,7 @@ fn time_stamps_do_not_depend_on_when_a_task_was_started() {
     embassy_time::MockDriver::get().advance(Duration::from_micros(750));
     let exchange = clocked(&mut bench);
     let sensor = Sensor::new(7);
-    spawn(&mut bench, &sensor, TaskId::ArmAngle, exchange);
+    spawn(&mut bench, &sensor, SensorId::ArmAngle, exchange);
     bench.run_ms(10);
     assert_eq!(sensor.reads(), [4, 6, 8, 10, 12]);
 }

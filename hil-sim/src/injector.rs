@@ -96,7 +96,6 @@ impl FaultInjector {
     /// The faults of a scenario; none if it has none.
     pub fn of(scenario: &Scenario) -> Option<Self> {
         let injections = &scenario.run.faults;
-        let turn_mm = std::f64::consts::TAU * scenario.rig.rig.wheel_radius_mm;
         let plant = scenario.plant();
         let active = |injection: &Injection| Active {
             injection: *injection,
@@ -108,7 +107,7 @@ impl FaultInjector {
             shows_s: None,
             sensor: injection.target.is_sensor().then(|| {
                 let (target, kind) = (injection.target, injection.kind);
-                FaultySensor::new(target, kind, injection.magnitude(), &scenario.rig.sense, turn_mm)
+                FaultySensor::new(target, kind, injection.magnitude(), &scenario.rig)
             }),
             kept: None,
             pipeline: VecDeque::new(),

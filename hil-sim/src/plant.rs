@@ -16,5 +16,6 @@ pub mod ring;
 pub mod rolling;
 pub mod sensors;
 pub mod spread;
+pub mod truth;
 pub mod wall;
 pub mod wind_up;

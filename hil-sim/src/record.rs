@@ -20,6 +20,7 @@ mod time_lost;
 mod view;
 mod write;
 
+pub use columns::Column;
 pub use csv_file::{Metadata, write_metadata};
 pub use decoder::{Counts, Decoder, Item, Mark};
 pub use joined::JoinedLog;

@@ -183,7 +183,7 @@ impl Replay<'_> {
             recorded,
             replayed,
         };
-        let Some(seen) = row.telemetry() else {
+        let Some(seen) = row.telemetry_over(&output.telemetry) else {
             let numbers = format!("mode {}, stage {}", row.mode, row.stage);
             return Some(differs("log", "mode and stage", numbers, "a meaning".to_owned()));
         };
@@ -194,10 +194,12 @@ impl Replay<'_> {
         }
         let again = Record::of(input, output);
         if seen != output.telemetry {
-            let replayed = Columns::of(&again, &input.sensors);
-            let (recorded, replayed) = (columns(row), columns(&replayed));
-            for (stage, names) in STAGES {
-                if let Some(name) = names.iter().find(|name| recorded[**name] != replayed[**name]) {
+            let recorded = Record { telemetry: seen, ..again };
+            let [recorded, replayed] =
+                [recorded, again].map(|record| columns(&Columns::of(&record, &input.sensors)));
+            let differing = |name: &&str| recorded[*name] != replayed[*name];
+            for stage in STAGES {
+                if let Some(name) = given_by(stage).find(differing) {
                     let (recorded, replayed) = (&recorded[name], &replayed[name]);
                     return Some(differs(stage, name, recorded.to_string(), replayed.to_string()));
                 }
@@ -240,17 +242,23 @@ fn columns(row: &Columns) -> Value {
     serde_json::to_value(row).unwrap_or_default()
 }
 
-/// The stages of a tick in their order, each with the columns that it gives.
-const STAGES: [(&str, &[&str]); 8] = [
-    ("sensing", &["wheel_speed_mm_s", "preload_n", "compression_mm", "radius_mm"]),
-    ("odometry", &["position_mm"]),
+/// The stages of a tick in their order.
+const STAGES: [&str; 8] =
+    ["sensing", "odometry", "mode", "contact", "plan", "schedule", "loops", "vibration"];
+
+/// Columns beside the quantities, and the stages that give them.
+const OTHERS: [(&str, &[&str]); 3] = [
     ("mode", &["mode", "retracts", "fault"]),
-    ("contact", &["stage", "level", "distance_mm"]),
-    ("plan", &["gap_predicted_mm"]),
-    ("schedule", &["preload_ref_n", "speed_ref_mm_s", "slip_margin"]),
+    ("contact", &["stage", "level"]),
     ("loops", &["drive_duty", "pretightener_duty"]),
-    ("vibration", &["vibration_mm"]),
 ];
+
+/// The columns that a stage gives.
+fn given_by(stage: &str) -> impl Iterator<Item = &'static str> {
+    let others = OTHERS.into_iter().filter(move |one| one.0 == stage).flat_map(|one| one.1);
+    let quantities = Columns::QUANTITIES.iter().filter(move |column| column.stage == stage);
+    others.copied().chain(quantities.map(|column| column.name))
+}
 
 /// Whether the board reports it, not the controller.
 const fn is_of_board(event: Event) -> bool {
@@ -352,8 +360,7 @@ mod tests {
 
     #[test]
     fn every_column_of_the_state_belongs_to_a_stage() {
-        let staged: Vec<&str> =
-            STAGES.iter().flat_map(|(_, names)| names.iter().copied()).collect();
+        let staged: Vec<&str> = STAGES.into_iter().flat_map(given_by).collect();
         let row = columns(&Columns::default());
         let row = row.as_object().unwrap();
         assert!(staged.iter().all(|name| row.contains_key(*name)));

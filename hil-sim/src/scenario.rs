@@ -20,7 +20,8 @@ use toml::{Table, Value};
 
 use crate::plant::draw::PlantParameters;
 use crate::plant::mismatch::Mismatch;
-use crate::plant::spread::{Noise, Section, Spread};
+use crate::plant::sensors::Noise;
+use crate::plant::spread::{Section, Spread};
 
 use keys::Kind;
 use merge::{COMMAND_LINE, Merged, Provenance};

@@ -8,7 +8,7 @@ mod host_io;
 mod parts;
 mod serve;
 
-pub(crate) use parts::{Angle, Bridges, Button, CompressionSensor, PreloadSensor, Wheel, split};
+pub(crate) use parts::{Analog, Angle, Bridges, Button, Wheel, split};
 
 use embassy_executor::{InterruptExecutor, Spawner};
 use embassy_stm32::interrupt::{self, InterruptExt, Priority};

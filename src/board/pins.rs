@@ -8,13 +8,16 @@ mod readback;
 mod wheel;
 
 use embassy_stm32::gpio::AnyPin;
-use embassy_stm32::{Peri, Peripherals};
+use embassy_stm32::peripherals::{DMA1_CH1, DMA1_CH2};
+use embassy_stm32::{Peri, Peripherals, bind_interrupts, dma};
+use interstage::sense::raw::SensorId;
 use rtt_target::DownChannel;
 
-use super::registers::{ADC1, ADC2, ADC3, DMA1, TIM1, TIM8};
+use super::registers::{ADCS, DMA1, TIM1, TIM8};
 use super::rtt::Frames;
 use super::{Console, Guard, Lamp, ParameterFlash, Parts, TextLog};
-use analog::{Analog, Ring};
+pub(crate) use analog::Analog;
+use analog::Ring;
 pub(crate) use angle::Angle;
 use bridge::Bridge;
 pub(crate) use bridge::Bridges;
@@ -22,11 +25,12 @@ pub(crate) use button::Button;
 use readback::Readback;
 pub(crate) use wheel::Wheel;
 
-pub(crate) type PreloadSensor = Analog;
-pub(crate) type CompressionSensor = Analog;
+bind_interrupts!(struct Irqs {
+    DMA1_CHANNEL1 => dma::InterruptHandler<DMA1_CH1>;
+    DMA1_CHANNEL2 => dma::InterruptHandler<DMA1_CH2>;
+});
 
-static PRELOAD_SENSOR: Ring = Ring::new();
-static COMPRESSION_SENSOR: Ring = Ring::new();
+static RINGS: [Ring; SensorId::ANALOG.len()] = [const { Ring::new() }; SensorId::ANALOG.len()];
 
 /// In a pause of a plan: ticks go on beside it, and feed the watchdog.
 pub(crate) const fn paused() {}
@@ -39,23 +43,15 @@ pub(crate) fn split(
 ) -> (Parts, Peri<'static, AnyPin>, ParameterFlash) {
     let parts = Parts {
         wheel_encoder: Wheel::new(p.TIM5, p.PA0, p.PA1),
-        preload_sensor: Analog::new(
-            (p.ADC1, ADC1),
-            p.PC2,
-            (p.DMA1_CH1, DMA1.ch(0)),
-            &PRELOAD_SENSOR,
-        ),
-        compression_sensor: Analog::new(
-            (p.ADC2, ADC2),
-            p.PC3,
-            (p.DMA1_CH2, DMA1.ch(1)),
-            &COMPRESSION_SENSOR,
-        ),
+        analog: [
+            Analog::new((p.ADC1, ADCS[0]), p.PC2, (p.DMA1_CH1, DMA1.ch(0)), &RINGS[0]),
+            Analog::new((p.ADC2, ADCS[1]), p.PC3, (p.DMA1_CH2, DMA1.ch(1)), &RINGS[1]),
+        ],
         arm_angle: Angle::new(p.SPI1, (p.PB3, p.PA7, p.PA6), p.PB10),
         motors: Bridges {
             drive: Bridge::new((p.TIM1, TIM1), p.PA8, p.PA9.into(), p.PA10.into(), p.PB12),
             preload: Bridge::new((p.TIM8, TIM8), p.PC6, p.PC8.into(), p.PC9.into(), p.PB7),
-            readback: Readback::new((p.ADC3, ADC3), p.PB0, p.PB1),
+            readback: Readback::new((p.ADC3, ADCS[2]), p.PB0, p.PB1),
         },
         watchdog: Guard::new(p.IWDG, p.TIM7),
         button: Button::new(p.PC13, p.EXTI13),

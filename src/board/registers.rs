@@ -3,7 +3,7 @@
 //!
 //! | block | what the library lacks |
 //! |---|---|
-//! | ADC1 to ADC3, DMA1 | the ring's place without an interrupt, the flag of injected results |
+//! | ADC1 to ADC5, DMA1 | the ring's place without an interrupt, the flag of injected results |
 //! | TIM1, TIM8 | one pulse of some periods; a duty without a check that can panic in the tick; a break's flags; the cut of both bridges from a handler |
 //! | TIM5 | the encoder's input filter |
 //! | SPI1 | a frame of which no step waits for a flag without end |
@@ -25,6 +25,9 @@ pub(crate) use pac::pwr::regs::Cr5;
 pub(crate) use pac::timer::TimAdv;
 pub(crate) use pac::timer::vals::{FilterValue, Ocm};
 pub(crate) use pac::{
-    ADC1, ADC2, ADC3, DBGMCU, DMA1, EXTI, FLASH, GPIOA, GPIOC, IWDG, PWR, RCC, SPI1, SYSCFG, TIM1,
-    TIM5, TIM8,
+    DBGMCU, DMA1, EXTI, FLASH, GPIOA, GPIOC, IWDG, PWR, RCC, SPI1, SYSCFG, TIM1, TIM5, TIM8,
 };
+
+/// The chip's converters.
+#[cfg(not(feature = "hil"))]
+pub(crate) const ADCS: [Adc; 5] = [pac::ADC1, pac::ADC2, pac::ADC3, pac::ADC4, pac::ADC5];

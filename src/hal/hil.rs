@@ -10,7 +10,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::sense::raw::{AdcCode, AngleFrame, BridgeCode, BridgeCodes, EncoderCount};
+use crate::sense::raw::{BridgeCode, BridgeCodes, SensorId};
 use crate::supervise::{Command, Mode, codes};
 use crate::units::{Duty, MotorCommand, Tick};
 
@@ -42,14 +42,10 @@ pub enum ToBoard {
 /// Inputs of a tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Given {
-    /// Wheel encoder's counter.
+    /// Wheel encoder's counter, which cannot fail.
     pub wheel_encoder: u16,
-    /// Preload sensor; none for a sensor that does not answer.
-    pub preload_sensor: Option<u16>,
-    /// Compression sensor; none as above.
-    pub compression_sensor: Option<u16>,
-    /// Frame of the arm's angle sensor; none as above.
-    pub arm_angle: Option<u16>,
+    /// The other sensors, by [`SensorId`]; none for one that does not answer.
+    pub others: [Option<u16>; SensorId::COUNT - 1],
     /// Outputs of the bridges of drive and pre-tightener; none as above.
     pub bridges: Option<[u16; 2]>,
     /// The emergency stop's contact is open.
@@ -62,30 +58,29 @@ impl Given {
     /// No sensor answers, and nothing happens.
     pub const NOTHING: Self = Self {
         wheel_encoder: 0,
-        preload_sensor: None,
-        compression_sensor: None,
-        arm_angle: None,
+        others: [None; SensorId::COUNT - 1],
         bridges: None,
         stop: false,
         command: 0,
     };
 
     /// Every sensor answers with these codes; nothing else happens.
-    pub const fn codes(
-        wheel_encoder: EncoderCount,
-        preload_sensor: AdcCode,
-        compression_sensor: AdcCode,
-        arm_angle: AngleFrame,
+    pub fn codes(
+        [wheel_encoder, others @ ..]: [u16; SensorId::COUNT],
         bridges: BridgeCodes,
     ) -> Self {
         Self {
-            wheel_encoder: wheel_encoder.get(),
-            preload_sensor: Some(preload_sensor.get()),
-            compression_sensor: Some(compression_sensor.get()),
-            arm_angle: Some(arm_angle.get()),
+            wheel_encoder,
+            others: others.map(Some),
             bridges: Some([bridges.drive.get(), bridges.pretightener.get()]),
             ..Self::NOTHING
         }
+    }
+
+    /// Code of a sensor; none for one that does not answer.
+    pub fn code(&self, sensor: SensorId) -> Option<u16> {
+        let wheel = [Some(self.wheel_encoder)];
+        wheel.iter().chain(&self.others).nth(sensor as usize).copied().flatten()
     }
 
     /// The same with an operator's command, or none.
@@ -167,9 +162,7 @@ mod tests {
         let code = Some(u16::MAX);
         let given = Given {
             wheel_encoder: u16::MAX,
-            preload_sensor: code,
-            compression_sensor: code,
-            arm_angle: code,
+            others: [code; SensorId::COUNT - 1],
             bridges: Some([u16::MAX; 2]),
             stop: true,
             command: 4,
@@ -192,27 +185,20 @@ mod tests {
         #[test]
         fn messages_come_back_from_their_frames(
             tick in any::<u32>(),
-            codes in any::<[u16; 4]>(),
-            answers in any::<[bool; 3]>(),
+            wheel_encoder in any::<u16>(),
+            others in any::<[Option<u16>; SensorId::COUNT - 1]>(),
             bridges in any::<Option<[u16; 2]>>(),
             stop in any::<bool>(),
             command in 0..5_u8,
             duties in any::<[Option<i16>; 2]>(),
         ) {
-            let code = |at: usize| answers[at].then_some(codes[at + 1]);
-            let given = Given {
-                wheel_encoder: codes[0],
-                preload_sensor: code(0),
-                compression_sensor: code(1),
-                arm_angle: code(2),
-                bridges,
-                stop,
-                command,
-            };
-            let silent = Given { wheel_encoder: codes[0], stop, ..Given::default() };
+            let given = Given { wheel_encoder, others, bridges, stop, command };
+            let silent = Given { wheel_encoder, stop, ..Given::default() };
             prop_assert_eq!(given.silent(), silent);
             let sent = ToBoard::Tick(tick, given);
             prop_assert_eq!(framed(&sent), Some(sent));
+            let all = SensorId::ALL.map(|sensor| given.code(sensor));
+            prop_assert_eq!((all[0], &all[1..]), (Some(wheel_encoder), &others[..]));
             let taken = Taken { drive: duties[0], preload: duties[1], mode: 3 };
             let sent = ToHost::Done(tick, taken);
             prop_assert_eq!(framed(&sent), Some(sent));

@@ -8,6 +8,7 @@ use heapless::{HistoryBuf, Vec};
 use serde::{Deserialize, Serialize};
 
 use super::record::Record;
+use crate::sense::raw::SensorId;
 use crate::supervise::{Leg, Mode, codes};
 use crate::units::{Direction, Millimetres, Q16, Tick, q16};
 
@@ -43,7 +44,7 @@ pub struct CaptureSample {
     /// Low half of its tick.
     pub at: u16,
     /// Codes of wheel, preload sensor, compression sensor, arm.
-    pub codes: [u16; 4],
+    pub codes: [u16; SensorId::COUNT],
     /// Duties of drive and pre-tightener, Q15.
     pub duties: [i16; 2],
     /// Number of the mode.

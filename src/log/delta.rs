@@ -8,16 +8,21 @@
 //! one more than that before. Little-endian throughout.
 
 use super::record::{Flags, Record};
+use crate::sense::raw::SensorId;
 use crate::supervise::codes;
 use crate::tick::Telemetry;
 use crate::units::{Duty, Q16};
 
+/// Words of the sensors' ages and of their codes.
+const AGES: usize = SensorId::COUNT.div_ceil(4);
+const CODES: usize = SensorId::COUNT.div_ceil(2);
+
 /// Fields of a record coded as differences: the tick, the ages, and the quantities of
 /// [`Telemetry`].
-const NUMBERS: usize = 2 + Telemetry::QUANTITIES;
+const NUMBERS: usize = 1 + AGES + Telemetry::QUANTITIES;
 
 /// Words of a record that are copied.
-const WORDS: usize = 6;
+const WORDS: usize = CODES + 4;
 
 /// Bits of the map before those of the words.
 const DIFFERENCES: usize = 2 * NUMBERS;
@@ -44,6 +49,12 @@ const fn halves(word: u32) -> [u16; 2] {
     [word as u16, (word >> 16) as u16]
 }
 
+/// The first of these values.
+fn filled<T: Default, const N: usize>(values: impl IntoIterator<Item = T>) -> [T; N] {
+    let mut values = values.into_iter();
+    core::array::from_fn(|_| values.next().unwrap_or_default())
+}
+
 impl DeltaRecord {
     /// Zeros: the first record of a frame is coded as the difference from them.
     pub(super) const ZERO: Self = Self { numbers: [0; NUMBERS], words: [0; WORDS] };
@@ -53,45 +64,52 @@ impl DeltaRecord {
     }
 
     pub(super) fn of(record: &Record) -> Self {
-        let Record { telemetry: t, codes, ages: code_ages, bridges, flags } = record;
-        let [wheel, preload_sensor, compression_sensor, arm] = *codes;
-        let mut numbers = [0; NUMBERS];
-        let [at, ages, quantities @ ..] = &mut numbers;
-        *at = t.at;
-        // The arm's age lowest: it changes in every tick, as the arm is read every second one.
-        *ages = u32::from_le_bytes(*code_ages).rotate_left(8);
-        for (number, quantity) in quantities.iter_mut().zip(t.quantities()) {
-            *number = quantity.to_bits() as u32;
-        }
+        let Record { telemetry: t, codes, mut ages, bridges, flags } = *record;
+        // The last age lowest: the arm's changes in every tick, as it is read every second one.
+        ages.rotate_right(1);
+        let ages = ages
+            .chunks(4)
+            .map(|four| four.iter().rev().fold(0, |word, age| word << 8 | u32::from(*age)));
+        let quantities = t.quantities().map(|quantity| quantity.to_bits() as u32);
+        let codes = codes.chunks(2).map(|two| word(two[0], two.get(1).copied().unwrap_or(0)));
+        let rest = [
+            word(bridges[0], bridges[1]),
+            word(t.drive.to_bits() as u16, t.pretightener.to_bits() as u16),
+            u32::from_le_bytes([t.level, t.stage as u8, codes::of_mode(t.mode), 0]),
+            flags.to_bits().into(),
+        ];
         Self {
-            numbers,
-            words: [
-                word(wheel, preload_sensor),
-                word(compression_sensor, arm),
-                word(bridges[0], bridges[1]),
-                word(t.drive.to_bits() as u16, t.pretightener.to_bits() as u16),
-                u32::from_le_bytes([t.level, t.stage as u8, codes::of_mode(t.mode), 0]),
-                flags.to_bits().into(),
-            ],
+            numbers: filled([t.at].into_iter().chain(ages).chain(quantities)),
+            words: filled(codes.chain(rest)),
         }
     }
 
     /// The record of the integers; none if one of them has no meaning.
     pub(super) fn record(&self) -> Option<Record> {
-        let [at, ages, quantities @ ..] = self.numbers;
-        let [wheel_and_cell, tread_and_arm, bridges, duties, state, flags] = self.words;
+        let (ages, quantities) = self.numbers[1..].split_at(AGES);
+        let (sensors, &[bridges, duties, state, flags]) = self.words.split_last_chunk()?;
+        let mut ages: [u8; SensorId::COUNT] =
+            filled(ages.iter().flat_map(|ages| ages.to_le_bytes()));
+        ages.rotate_left(1);
         let [level, stage, mode, rest] = state.to_le_bytes();
-        let [wheel, preload_sensor] = halves(wheel_and_cell);
-        let [compression_sensor, arm] = halves(tread_and_arm);
         let [drive, pretightener] = halves(duties).map(|half| Duty::from_bits(half as i16));
         let (mode, stage) = (codes::mode(mode)?, codes::stage(stage)?);
         (rest == 0).then_some(())?;
-        let state =
-            Telemetry { at, mode, stage, level, drive, pretightener, ..Telemetry::default() };
+        let state = Telemetry {
+            at: self.at(),
+            mode,
+            stage,
+            level,
+            drive,
+            pretightener,
+            ..Telemetry::default()
+        };
         Some(Record {
-            telemetry: state.with_quantities(quantities.map(|bits| Q16::from_bits(bits as i32))),
-            codes: [wheel, preload_sensor, compression_sensor, arm],
-            ages: ages.rotate_right(8).to_le_bytes(),
+            telemetry: state.with_quantities(filled(
+                quantities.iter().map(|bits| Q16::from_bits(*bits as i32)),
+            )),
+            codes: filled(sensors.iter().flat_map(|word| halves(*word))),
+            ages,
             bridges: halves(bridges),
             flags: Flags::from_bits(u16::try_from(flags).ok()?),
         })

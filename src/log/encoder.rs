@@ -137,6 +137,7 @@ mod tests {
     use crate::fault::Limit;
     use crate::model::history::History;
     use crate::model::{Approach, Learned, LimitedBy, Outcome, Plan, PlanRequest, Review};
+    use crate::sense::raw::SensorId;
     use crate::supervise::Mode;
     use crate::tick::CrossingRecord;
 
@@ -339,7 +340,7 @@ mod tests {
         };
         let sample = CaptureSample {
             at: u16::MAX,
-            codes: [u16::MAX; 4],
+            codes: [u16::MAX; SensorId::COUNT],
             duties: [i16::MIN; 2],
             mode: 255,
             stage: 255,

@@ -3,11 +3,32 @@
 use serde::{Deserialize, Serialize};
 
 use super::crc32;
+use crate::sense::raw::SensorId;
+use crate::tick::Telemetry;
 use crate::units::Millimetres;
 
-/// Layout of the frames. Raised with every change of it; a reader of another number reports
-/// that and decodes nothing.
-pub const SCHEMA: u16 = 7;
+/// Number of the frames' layout beside the names of sensors and quantities, changed with it. Logs
+/// of the names before this hash have schema 7.
+const LAYOUT: u16 = 0x0836;
+
+/// Layout of the frames: a hash of the names in it (FNV-1a, folded). A reader of another number
+/// reports that and decodes nothing.
+pub const SCHEMA: u16 = {
+    let mut hash = 0x811C_9DC5_u32;
+    let all = [SensorId::NAMES, Telemetry::COLUMNS];
+    let (mut list, mut name, mut byte) = (0, 0, 0);
+    while list < all.len() {
+        if name == all[list].len() {
+            (list, name) = (list + 1, 0);
+        } else if byte == all[list][name].len() {
+            (name, byte) = (name + 1, 0);
+        } else {
+            hash = (hash ^ all[list][name].as_bytes()[byte] as u32).wrapping_mul(0x0100_0193);
+            byte += 1;
+        }
+    }
+    LAYOUT ^ hash as u16 ^ (hash >> 16) as u16
+};
 
 /// Longest version, build and name, bytes.
 pub const MAX_TEXT: usize = 24;

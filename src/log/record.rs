@@ -1,9 +1,7 @@
 //! One tick in the log: all inputs and outputs, so that a host can run it again and compare
 //! bits.
 
-use crate::sense::raw::{
-    AdcCode, AngleFrame, BridgeCode, BridgeCodes, EncoderCount, Sample, SensorFrame,
-};
+use crate::sense::raw::{BridgeCode, BridgeCodes, Sample, SensorFrame, SensorId};
 use crate::supervise::{Command, codes};
 use crate::tick::{Input, Output, Telemetry};
 use crate::units::{MotorCommand, Tick};
@@ -21,10 +19,10 @@ const NEVER: u8 = 255;
 pub struct Record {
     /// State after the tick; its time is that of the input.
     pub telemetry: Telemetry,
-    /// Codes of wheel, preload sensor, compression sensor and arm; 0 without a reading.
-    pub codes: [u16; 4],
+    /// Codes of the sensors, by [`SensorId`]; 0 without a reading.
+    pub codes: [u16; SensorId::COUNT],
     /// Coded ages of the codes, see [`Record::sensors`].
-    pub ages: [u8; 4],
+    pub ages: [u8; SensorId::COUNT],
     /// Codes of the bridges of drive and pre-tightener; 0 if there were none.
     pub bridges: [u16; 2],
     /// Everything else.
@@ -105,12 +103,7 @@ impl Record {
     /// The record of a tick.
     pub fn of(input: &Input, output: &Output) -> Self {
         let Input { now, sensors: from, .. } = input;
-        let sensors = [
-            pack(*now, from.wheel_encoder, EncoderCount::get),
-            pack(*now, from.preload_sensor, AdcCode::get),
-            pack(*now, from.compression_sensor, AdcCode::get),
-            pack(*now, from.arm_angle, AngleFrame::get),
-        ];
+        let sensors = from.samples.map(|sample| pack(*now, sample));
         let bridges = from.bridges.unwrap_or_default();
         Self {
             telemetry: output.telemetry,
@@ -130,10 +123,7 @@ impl Record {
     /// tick `before`.
     pub fn sensors(&self, before: &SensorFrame) -> SensorFrame {
         SensorFrame {
-            wheel_encoder: self.sample(0, before.wheel_encoder, EncoderCount::new),
-            preload_sensor: self.sample(1, before.preload_sensor, AdcCode::new),
-            compression_sensor: self.sample(2, before.compression_sensor, AdcCode::new),
-            arm_angle: self.sample(3, before.arm_angle, AngleFrame::new),
+            samples: SensorId::ALL.map(|sensor| self.sample(sensor, before[sensor])),
             bridges: self.flags.has(Flags::READBACK).then(|| {
                 let [drive, pretightener] = self.bridges.map(BridgeCode::new);
                 BridgeCodes { drive, pretightener }
@@ -141,19 +131,14 @@ impl Record {
         }
     }
 
-    fn sample<T>(
-        &self,
-        sensor: usize,
-        before: Option<Sample<T>>,
-        code: fn(u16) -> T,
-    ) -> Option<Sample<T>> {
+    fn sample(&self, sensor: SensorId, before: Option<Sample<u16>>) -> Option<Sample<u16>> {
         let taken = |age: u8| self.at().wrapping_add(NOW).wrapping_sub(age.into());
-        let at = match self.ages[sensor] {
+        let at = match self.ages[sensor as usize] {
             NEVER => return None,
             OLD => before.map_or(taken(OLD), |sample| sample.at),
             age => taken(age),
         };
-        Some(Sample { code: code(self.codes[sensor]), at })
+        Some(Sample { code: self.codes[sensor as usize], at })
     }
 
     /// Input of the tick except the plan and the service mode's duties; `before` as for
@@ -183,10 +168,10 @@ impl Record {
 }
 
 /// Code and coded age of a sample.
-fn pack<T>(now: Tick, sample: Option<Sample<T>>, code: fn(T) -> u16) -> (u16, u8) {
+fn pack(now: Tick, sample: Option<Sample<u16>>) -> (u16, u8) {
     let Some(sample) = sample else { return (0, NEVER) };
     let age = now.wrapping_sub(sample.at).wrapping_add(NOW);
-    (code(sample.code), if age < u32::from(OLD) { age as u8 } else { OLD })
+    (sample.code, if age < u32::from(OLD) { age as u8 } else { OLD })
 }
 
 #[cfg(test)]
@@ -201,7 +186,12 @@ pub(super) mod tests {
         let quantities = any::<[i32; Telemetry::QUANTITIES]>();
         (
             (any::<u32>(), 0..19_usize, 1..=6_u8, any::<u8>(), quantities, any::<[i16; 2]>()),
-            (any::<[u16; 4]>(), any::<[u8; 4]>(), any::<[u16; 2]>(), any::<u16>()),
+            (
+                any::<[u16; SensorId::COUNT]>(),
+                any::<[u8; SensorId::COUNT]>(),
+                any::<[u16; 2]>(),
+                any::<u16>(),
+            ),
         )
             .prop_map(
                 |((at, mode, stage, level, q, duties), (codes, ages, bridges, flags))| {
@@ -224,19 +214,19 @@ pub(super) mod tests {
         #[test]
         fn what_a_tick_was_given_comes_back(
             now in any::<u32>(),
-            codes in any::<[u16; 4]>(),
-            ages in prop::array::uniform4(prop::option::of(-8..=245_i32)),
+            codes in any::<[u16; SensorId::COUNT]>(),
+            ages in prop::collection::vec(prop::option::of(-8..=245_i32), SensorId::COUNT),
             command in prop::option::of(0..4_usize),
             bridges in prop::option::of(any::<[u16; 2]>()),
             overrun in any::<bool>(),
             emergency_stop in any::<bool>(),
         ) {
-            let at = |sensor: usize| ages[sensor].map(|age| now.wrapping_sub(age as u32));
+            let at = |age: i32| now.wrapping_sub(age as u32);
             let sensors = SensorFrame {
-                wheel_encoder: at(0).map(|at| Sample { code: EncoderCount::new(codes[0]), at }),
-                preload_sensor: at(1).map(|at| Sample { code: AdcCode::new(codes[1]), at }),
-                compression_sensor: at(2).map(|at| Sample { code: AdcCode::new(codes[2]), at }),
-                arm_angle: at(3).map(|at| Sample { code: AngleFrame::new(codes[3]), at }),
+                samples: SensorId::ALL.map(|sensor| {
+                    let code = codes[sensor as usize];
+                    ages[sensor as usize].map(|age| Sample { code, at: at(age) })
+                }),
                 bridges: bridges.map(|codes| {
                     let [drive, pretightener] = codes.map(BridgeCode::new);
                     BridgeCodes { drive, pretightener }
@@ -253,13 +243,13 @@ pub(super) mod tests {
 
         #[test]
         fn a_code_too_old_to_tell_keeps_its_time(now in 1000..u32::MAX, age in 246..900_u32) {
-            let old = Some(Sample { code: AdcCode::new(7), at: now - age });
-            let frame = SensorFrame { compression_sensor: old, ..SensorFrame::default() };
+            let mut frame = SensorFrame::default();
+            frame[SensorId::CompressionSensor] = Some(Sample { code: 7, at: now - age });
             let input = Input { now, sensors: frame, ..Input::default() };
             let record = Record::of(&input, &output_at(now));
             prop_assert_eq!(record.sensors(&frame), frame);
             // Without a tick before, it is at least old.
-            let alone = record.sensors(&SensorFrame::default()).compression_sensor.unwrap();
+            let alone = record.sensors(&SensorFrame::default())[SensorId::CompressionSensor].unwrap();
             prop_assert_eq!(now - alone.at, 246);
         }
     }

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{SNAPSHOT_WORDS, check};
 use crate::sense::Zeros;
+use crate::sense::raw::SensorId;
 use crate::supervise::{Mode, codes};
 use crate::units::{Millimetres, MillimetresPerSecond, Q16, Tick};
 
@@ -72,11 +73,6 @@ impl MissedCheckIns {
     /// The control tick did not start: something of higher priority keeps the processor.
     pub const STARVED: Self = Self(1 << 15);
 
-    /// Names by bit; the bits after them are operators' tasks and the host's line, in the order
-    /// of their start.
-    const NAMES: [&'static str; 6] =
-        ["wheel encoder", "preload sensor", "compression sensor", "arm angle", "model", "journal"];
-
     /// The task of this number, by [`TaskId`](crate::tasks::TaskId).
     pub const fn task(index: usize) -> Self {
         Self(1 << (index & 0xF))
@@ -108,7 +104,11 @@ impl MissedCheckIns {
             16 => "nobody",
             15 => "the control tick, kept from the processor",
             14 => "the control tick",
-            bit => Self::NAMES.get(bit).copied().unwrap_or("an operator's task or the host's line"),
+            // After these the operators' tasks and the host's line, in the order of their start.
+            bit => {
+                let mut names = SensorId::NAMES.iter().chain(&["model", "journal"]);
+                names.nth(bit).copied().unwrap_or("an operator's task or the host's line")
+            }
         }
     }
 }

@@ -1,4 +1,8 @@
-//! Raw codes of the peripherals, one type each, and their time stamp.
+//! Raw codes of the peripherals, one type each, their time stamp, and the sensors that give them.
+
+use core::ops::{Index, IndexMut};
+
+use serde::{Deserialize, Serialize};
 
 use crate::units::Tick;
 
@@ -99,19 +103,97 @@ pub struct Sample<T> {
     pub at: Tick,
 }
 
+/// Passes the sensors to the macro `$then`, behind what else it is given: each with its text, its
+/// name and that in a scenario's faults, the ticks from one reading to the next, and its columns in
+/// the log: the code, what may be wrong with it, and the tick at which it was taken.
+///
+/// The order is that of codes in frames and messages, of the tasks, and of the bits of
+/// [`MissedCheckIns`](crate::restart::MissedCheckIns).
+#[macro_export]
+macro_rules! sensors {
+    ($then:ident $($given:tt)*) => {
+        $then! { $($given)*
+            /// Wheel encoder: its counter, 16 bits, wraps.
+            WheelEncoder "wheel encoder" "encoder", 1:
+                wheel_encoder_code, wheel_encoder_at;
+            /// Preload sensor between pre-tightener and arm: code of the converter.
+            PreloadSensor "preload sensor" "preload-sensor", 1:
+                preload_code, preload_at;
+            /// Compression sensor of the tread, between arm and wheel: code of the converter.
+            CompressionSensor "compression sensor" "compression-sensor", 1:
+                compression_code, compression_at;
+            /// Arm angle sensor at the pillar: its 14-bit code, 16384 a turn.
+            ArmAngle "arm angle" "angle", 2:
+                arm_angle_code (arm_angle_error), arm_angle_at;
+        }
+    };
+}
+
+macro_rules! sensor_id {
+    ($($(#[$doc:meta])* $id:ident $name:literal $fault:literal, $period:literal:
+        $code:ident $(($error:ident))?, $at:ident;)*) => {
+        /// A sensor.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+        pub enum SensorId {
+            $($(#[$doc])* #[serde(rename = $fault)] $id,)*
+        }
+
+        impl SensorId {
+            /// Every sensor.
+            pub const ALL: [Self; Self::COUNT] = [$(Self::$id),*];
+            /// How many there are.
+            pub const COUNT: usize = Self::NAMES.len();
+            /// Their names, in the same order.
+            pub const NAMES: &[&str] = &[$($name),*];
+            /// Ticks from one reading to the next, in the same order.
+            pub const PERIODS: [u32; Self::COUNT] = [$($period),*];
+        }
+    };
+}
+crate::sensors!(sensor_id);
+
+impl SensorId {
+    /// Those that a converter of the board reads.
+    pub const ANALOG: [Self; 2] = [Self::PreloadSensor, Self::CompressionSensor];
+}
+
 /// The latest code of each sensor; none until its first answer.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SensorFrame {
-    /// Wheel encoder.
-    pub wheel_encoder: Option<Sample<EncoderCount>>,
-    /// Preload sensor between pre-tightener and arm.
-    pub preload_sensor: Option<Sample<AdcCode>>,
-    /// Tread compression between arm and wheel.
-    pub compression_sensor: Option<Sample<AdcCode>>,
-    /// Arm angle at the pillar.
-    pub arm_angle: Option<Sample<AngleFrame>>,
+    /// By [`SensorId`].
+    pub samples: [Option<Sample<u16>>; SensorId::COUNT],
     /// Output of the bridges since the tick before; none if nothing was converted.
     pub bridges: Option<BridgeCodes>,
+}
+
+impl SensorFrame {
+    /// Codes of the first sensors, by [`SensorId`], taken at the same tick; none of the others.
+    pub fn taken<const N: usize>(at: Tick, codes: [u16; N]) -> Self {
+        let mut frame = Self::default();
+        for (sample, code) in frame.samples.iter_mut().zip(codes) {
+            *sample = Some(Sample { code, at });
+        }
+        frame
+    }
+
+    /// The latest code of a sensor as its type, of which `new` makes one.
+    pub fn get<T>(&self, sensor: SensorId, new: fn(u16) -> T) -> Option<Sample<T>> {
+        self[sensor].map(|Sample { code, at }| Sample { code: new(code), at })
+    }
+}
+
+impl Index<SensorId> for SensorFrame {
+    type Output = Option<Sample<u16>>;
+
+    fn index(&self, sensor: SensorId) -> &Self::Output {
+        &self.samples[sensor as usize]
+    }
+}
+
+impl IndexMut<SensorId> for SensorFrame {
+    fn index_mut(&mut self, sensor: SensorId) -> &mut Self::Output {
+        &mut self.samples[sensor as usize]
+    }
 }
 
 #[cfg(test)]

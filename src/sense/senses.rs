@@ -6,7 +6,7 @@ use super::analog::{AnalogChannel, AnalogState, Zeroing};
 use super::angle::AngleSensor;
 use super::arm::Arm;
 use super::freshness::{LastGood, Reading, Validity};
-use super::raw::SensorFrame;
+use super::raw::{AdcCode, AngleFrame, EncoderCount, SensorFrame, SensorId};
 use super::speed::{self, SpeedState, Speedometer};
 use crate::rig::{Rig, RigError};
 use crate::units::{
@@ -137,14 +137,16 @@ impl Senses {
         acceleration: MillimetresPerSecond2,
     ) -> SensedState {
         let limit = self.limit;
-        let SensesState { wheel_encoder, preload_sensor, compression_sensor, arm_angle, .. } =
-            state;
-        let wheel = frame.wheel_encoder;
-        let motion = self.wheel_encoder.step(wheel_encoder, now, wheel, acceleration, limit);
-        let preload = self.preload_sensor.step(preload_sensor, now, frame.preload_sensor, limit);
-        let pressed = frame.compression_sensor;
-        let compression = self.compression_sensor.step(compression_sensor, now, pressed, limit);
-        let angle = self.arm_angle.step(arm_angle, now, frame.arm_angle, limit);
+        let counted = frame.get(SensorId::WheelEncoder, EncoderCount::new);
+        let motion =
+            self.wheel_encoder.step(&mut state.wheel_encoder, now, counted, acceleration, limit);
+        let pressing = frame.get(SensorId::PreloadSensor, AdcCode::new);
+        let preload = self.preload_sensor.step(&mut state.preload_sensor, now, pressing, limit);
+        let pressed = frame.get(SensorId::CompressionSensor, AdcCode::new);
+        let compression =
+            self.compression_sensor.step(&mut state.compression_sensor, now, pressed, limit);
+        let turned = frame.get(SensorId::ArmAngle, AngleFrame::new);
+        let angle = self.arm_angle.step(&mut state.arm_angle, now, turned, limit);
         let (radius, tan_arm) = self.arm.stance(angle.filtered);
         let steps_up = self.arm.steps_up(radius, compression.filtered);
         let level = self.arm.level(state.level, steps_up);
@@ -234,7 +236,6 @@ impl SensesState {
 #[cfg(test)]
 #[allow(clippy::float_arithmetic, reason = "the reference is in f64")]
 mod tests {
-    use super::super::raw::{AdcCode, AngleFrame, EncoderCount, Sample};
     use super::*;
 
     /// What the sensors of the prototype give in a state of the mechanism.
@@ -256,17 +257,12 @@ mod tests {
     fn frame(truth: &Truth, at: Tick) -> SensorFrame {
         let count_mm = 2.0 * core::f64::consts::PI * 25.0 / 8192.0;
         let counts = (truth.position_mm / count_mm).floor() as i64 as u16;
-        let analog = |part: f64| AdcCode::new((65_535.0 * (0.05 + 0.85 * part)).round() as u16);
+        let analog = |part: f64| (65_535.0 * (0.05 + 0.85 * part)).round() as u16;
         let angle = theta(truth.radius_mm) / (2.0 * core::f64::consts::PI) * 16_384.0 + 2000.0;
         let code = angle.round() as u16;
         let parity = (code.count_ones() % 2) as u16;
-        SensorFrame {
-            wheel_encoder: Some(Sample { code: EncoderCount::new(counts), at }),
-            preload_sensor: Some(Sample { code: analog(truth.preload_n / 200.0), at }),
-            compression_sensor: Some(Sample { code: analog(truth.compression_mm / 5.0), at }),
-            arm_angle: Some(Sample { code: AngleFrame::new(code | parity << 15), at }),
-            bridges: None,
-        }
+        let [preload, compression] = [truth.preload_n / 200.0, truth.compression_mm / 5.0];
+        SensorFrame::taken(at, [counts, analog(preload), analog(compression), code | parity << 15])
     }
 
     fn build() -> Senses {
@@ -308,17 +304,12 @@ mod tests {
     #[test]
     fn each_sensor_becomes_stale_on_its_own() {
         let senses = build();
-        for silent in 0..4 {
+        for silent in 0..SensorId::COUNT {
             let mut state = SensesState::default();
             let mut sensed = still(&senses, &mut state, 0, &STOWED);
             for now in 1..=21 {
-                let (old, mut mixed) = (frame(&STOWED, 0), frame(&STOWED, now));
-                match silent {
-                    0 => mixed.wheel_encoder = old.wheel_encoder,
-                    1 => mixed.preload_sensor = old.preload_sensor,
-                    2 => mixed.compression_sensor = old.compression_sensor,
-                    _ => mixed.arm_angle = old.arm_angle,
-                }
+                let mut mixed = frame(&STOWED, now);
+                mixed.samples[silent] = frame(&STOWED, 0).samples[silent];
                 sensed = senses.step(&mut state, now, &mixed, Default::default());
             }
             let mut expected = [Validity::Valid; 4];
@@ -368,8 +359,8 @@ mod tests {
             (Truth { compression_mm: 3.6, ..STOWED }, Truth { radius_mm: 121.0, ..STOWED });
         // Each of them shows a step while the other is sound.
         assert_eq!((level(pressed, |_| ()), level(up, |_| ())), (1, 1));
-        assert_eq!(level(pressed, |frame| frame.arm_angle = None), 0);
-        assert_eq!(level(up, |frame| frame.compression_sensor = None), 0);
+        assert_eq!(level(pressed, |frame| frame[SensorId::ArmAngle] = None), 0);
+        assert_eq!(level(up, |frame| frame[SensorId::CompressionSensor] = None), 0);
     }
 
     #[test]

@@ -131,7 +131,7 @@ impl Monitor {
             .then_some(Fault::EmergencyStop)
             .or(seen.overrun.then_some(Fault::TickOverrun))
             .or(overpressure.then_some(Fault::Overpressure))
-            .or(sensor_fault(seen.sensed))
+            .or(sensor_fault(seen.sensed, true))
             .or(bridge)
             .or(runaway.then_some(Fault::DriveRunaway))
             .or(crossed)
@@ -198,8 +198,9 @@ impl MonitorState {
     }
 }
 
-/// The fault of a sensor that cannot be used any more.
-fn sensor_fault(sensed: &SensedState) -> Option<Fault> {
+/// The fault of a sensor that cannot be used; whether one that is out of range has another one than
+/// one that is silent.
+pub(super) fn sensor_fault(sensed: &SensedState, ranged: bool) -> Option<Fault> {
     let faults = [
         (Fault::WheelEncoderStale, Fault::WheelEncoderStale),
         (Fault::PreloadSensorStale, Fault::PreloadSensorRange),
@@ -209,7 +210,7 @@ fn sensor_fault(sensed: &SensedState) -> Option<Fault> {
     sensed.validities().into_iter().zip(faults).find_map(
         |(validity, (stale, range))| match validity {
             Validity::Valid | Validity::Held(_) => None,
-            Validity::Invalid(Reason::OutOfRange) => Some(range),
+            Validity::Invalid(Reason::OutOfRange) if ranged => Some(range),
             Validity::Invalid(Reason::NoField) => Some(Fault::ArmAngleMagnet),
             _ => Some(stale),
         },

@@ -45,7 +45,7 @@ fn each_sensor_s_state_has_its_fault() {
         for (sensor, faults) in faults.iter().enumerate() {
             let mut sensed = sensed(0.0, 40.0);
             *sensed.validities_mut()[sensor] = validity;
-            assert_eq!(sensor_fault(&sensed), expected.map(|which: usize| faults[which]));
+            assert_eq!(sensor_fault(&sensed, true), expected.map(|which: usize| faults[which]));
         }
     }
 }

@@ -2,8 +2,9 @@
 
 #![deny(clippy::float_arithmetic)]
 
+use super::monitor::sensor_fault;
 use crate::fault::Fault;
-use crate::sense::{Reason, SensedState, Validity};
+use crate::sense::SensedState;
 use crate::units::{Millimetres, MillimetresPerSecond, Newtons, q16};
 
 /// Ticks of rest that the self-test watches.
@@ -17,17 +18,7 @@ const UNPRESSED: Millimetres = q16(100_000);
 
 /// The fault of the first sensor that has not answered with good codes; none if all have.
 pub fn silent(sensed: &SensedState) -> Option<Fault> {
-    let stale = [
-        Fault::WheelEncoderStale,
-        Fault::PreloadSensorStale,
-        Fault::CompressionSensorStale,
-        Fault::ArmAngleStale,
-    ];
-    sensed.validities().into_iter().zip(stale).find_map(|(validity, stale)| match validity {
-        Validity::Valid | Validity::Held(_) => None,
-        Validity::Invalid(Reason::NoField) => Some(Fault::ArmAngleMagnet),
-        _ => Some(stale),
-    })
+    sensor_fault(sensed, false)
 }
 
 /// Whether the wheel rests.
@@ -50,6 +41,7 @@ pub fn stowed(sensed: &SensedState, pressed: Newtons, zero_limit: Newtons) -> bo
 #[allow(clippy::float_arithmetic, reason = "quantities of a test")]
 mod tests {
     use super::*;
+    use crate::sense::{Reason, Validity};
     use crate::units::Q16;
 
     /// Sensor values on this wall, at this speed, preload and compression.

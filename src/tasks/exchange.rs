@@ -3,14 +3,14 @@
 use core::sync::atomic::{AtomicU32, Ordering};
 
 use super::cycles::CycleCount;
-use super::liveness::{Liveness, PERIODS};
+use super::liveness::Liveness;
 use crate::hal::Light;
 use crate::log::Record;
 use crate::model::{Plan, PlanRequest};
 use crate::params::Refusal;
 use crate::params::service::Response;
 use crate::restart::MissedCheckIns;
-use crate::sense::raw::{AdcCode, AngleFrame, EncoderCount, Sample, SensorFrame};
+use crate::sense::raw::{Sample, SensorFrame, SensorId};
 use crate::supervise::{Command, Mode, ServiceDuties};
 use crate::tick::{Entry, Input, Output, Telemetry};
 use crate::units::Tick;
@@ -47,14 +47,11 @@ pub struct TickIo {
 pub struct Exchange {
     pub(super) liveness: Liveness,
     pub(super) cycles: CycleCount,
-    /// Wakes each sensor's task, by [`TaskId`](super::TaskId): the tick for which it reads.
-    pub(super) sensor_ticks: [Signal<Raw, Tick>; PERIODS.len()],
+    /// Wakes each sensor's task: the tick for which it reads. This and what follows by [`SensorId`].
+    pub(super) sensor_ticks: [Signal<Raw, Tick>; SensorId::COUNT],
+    pub(super) sensor_codes: [Latest<Sample<u16>>; SensorId::COUNT],
     pub(super) tick_started: Signal<Raw, ()>,
     pub(super) tick_ended: Signal<Raw, ()>,
-    pub(super) wheel_encoder: Latest<Sample<EncoderCount>>,
-    pub(super) preload_sensor: Latest<Sample<AdcCode>>,
-    pub(super) compression_sensor: Latest<Sample<AdcCode>>,
-    pub(super) arm_angle: Latest<Sample<AngleFrame>>,
     pub(super) request: Slot<PlanRequest>,
     pub(super) answer: Slot<Plan>,
     pub(super) commands: Channel<Raw, Command, COMMANDS>,
@@ -74,13 +71,10 @@ impl Exchange {
         Self {
             liveness: Liveness::new(),
             cycles: CycleCount::new(),
-            sensor_ticks: [const { Signal::new() }; PERIODS.len()],
+            sensor_ticks: [const { Signal::new() }; SensorId::COUNT],
+            sensor_codes: [const { Watch::new() }; SensorId::COUNT],
             tick_started: Signal::new(),
             tick_ended: Signal::new(),
-            wheel_encoder: Watch::new(),
-            preload_sensor: Watch::new(),
-            compression_sensor: Watch::new(),
-            arm_angle: Watch::new(),
             request: Channel::new(),
             answer: Channel::new(),
             commands: Channel::new(),
@@ -97,12 +91,12 @@ impl Exchange {
     /// Wakes the sensors that are due in this tick, and the control tick.
     ///
     /// The executor runs tasks woken together from the last to the first: the sensors in the
-    /// order of [`TaskId`](super::TaskId), then the control tick, which so finds the codes of its own
+    /// order of [`SensorId`], then the control tick, which so finds the codes of its own
     /// millisecond.
     pub(super) fn start_tick(&self, tick: Tick) {
         self.liveness.start(tick);
         self.tick_started.signal(());
-        for (period, sensor) in PERIODS.iter().zip(&self.sensor_ticks).rev() {
+        for (period, sensor) in SensorId::PERIODS.iter().zip(&self.sensor_ticks).rev() {
             if tick.is_multiple_of(*period) {
                 sensor.signal(tick);
             }
@@ -161,13 +155,7 @@ impl Exchange {
 
     /// The latest code of each sensor, without the bridges'.
     pub fn sensors(&self) -> SensorFrame {
-        SensorFrame {
-            wheel_encoder: self.wheel_encoder.try_get(),
-            preload_sensor: self.preload_sensor.try_get(),
-            compression_sensor: self.compression_sensor.try_get(),
-            arm_angle: self.arm_angle.try_get(),
-            bridges: None,
-        }
+        SensorFrame { samples: self.sensor_codes.each_ref().map(Watch::try_get), bridges: None }
     }
 
     /// The row of the latest tick; none before the first.

@@ -4,16 +4,14 @@ use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
 
 use crate::restart::MissedCheckIns;
 use crate::sense::freshness::age;
+use crate::sense::raw::SensorId;
 use crate::units::Tick;
 
 /// Longest time without a check-in of a healthy task, ticks.
 pub const CHECK_IN_TICKS: u32 = 50;
 
-/// Ticks between two readings of each sensor, by [`TaskId`].
-pub(super) const PERIODS: [u32; 4] = [1, 1, 1, 2];
-
 /// Tasks that always run.
-const FIXED: usize = 6;
+const FIXED: usize = SensorId::COUNT + 2;
 
 /// Most operator tasks.
 const OPERATORS: usize = 4;
@@ -21,14 +19,8 @@ const OPERATORS: usize = 4;
 /// A task that checks in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TaskId {
-    /// [`wheel_encoder`](super::wheel_encoder()).
-    WheelEncoder,
-    /// [`preload_sensor`](super::preload_sensor()).
-    PreloadSensor,
-    /// [`compression_sensor`](super::compression_sensor()).
-    CompressionSensor,
-    /// [`arm_angle`](super::arm_angle()).
-    ArmAngle,
+    /// That of a sensor.
+    Sensor(SensorId),
     /// [`model`](super::model()).
     Model,
     /// [`journal`](super::journal()).
@@ -40,12 +32,9 @@ pub enum TaskId {
 impl TaskId {
     pub(super) const fn index(self) -> usize {
         match self {
-            Self::WheelEncoder => 0,
-            Self::PreloadSensor => 1,
-            Self::CompressionSensor => 2,
-            Self::ArmAngle => 3,
-            Self::Model => 4,
-            Self::Journal => 5,
+            Self::Sensor(sensor) => sensor as usize,
+            Self::Model => SensorId::COUNT,
+            Self::Journal => SensorId::COUNT + 1,
             Self::Operator(number) => FIXED + number as usize,
         }
     }
@@ -89,7 +78,7 @@ impl Liveness {
         if let Some(seen) = self.check_ins.get(task.index()) {
             seen.store(now, Ordering::Relaxed);
         }
-        if task.index() >= PERIODS.len() {
+        if task.index() >= SensorId::COUNT {
             self.running(task);
         }
     }
@@ -122,7 +111,7 @@ impl Liveness {
         }
         let missed = self.missed(now);
         // A task that does not return blocks all others of its executor.
-        if missed == all(PERIODS.len()..self.tasks()) {
+        if missed == all(SensorId::COUNT..self.tasks()) {
             MissedCheckIns::task(self.background.load(Ordering::Relaxed).into())
         } else {
             missed
@@ -137,7 +126,7 @@ impl Liveness {
             return MissedCheckIns::TICK;
         }
         let started = self.started.load(Ordering::Relaxed);
-        let stalled = PERIODS
+        let stalled = SensorId::PERIODS
             .iter()
             .zip(&self.check_ins)
             .position(|(period, seen)| seen.load(Ordering::Relaxed) != started - started % period);
@@ -153,14 +142,11 @@ fn all(tasks: impl Iterator<Item = usize>) -> MissedCheckIns {
 mod tests {
     use super::*;
 
-    const ALWAYS: [TaskId; FIXED] = [
-        TaskId::WheelEncoder,
-        TaskId::PreloadSensor,
-        TaskId::CompressionSensor,
-        TaskId::ArmAngle,
-        TaskId::Model,
-        TaskId::Journal,
-    ];
+    /// The tasks that always run, in their order.
+    fn always() -> impl Iterator<Item = TaskId> + Clone {
+        let sensors = SensorId::ALL.into_iter().map(TaskId::Sensor);
+        sensors.chain([TaskId::Model, TaskId::Journal])
+    }
 
     #[test]
     fn one_silent_task_is_enough() {
@@ -168,7 +154,7 @@ mod tests {
         assert!(liveness.missed(CHECK_IN_TICKS).is_nobody(), "since boot");
         assert_eq!(liveness.missed(CHECK_IN_TICKS + 1).bits(), 0x3F);
         let operators = [liveness.enrol_operator(), liveness.enrol_operator()];
-        let tasks: Vec<_> = ALWAYS.into_iter().chain(operators).collect();
+        let tasks: Vec<_> = always().chain(operators).collect();
         for silent in &tasks {
             for task in &tasks {
                 liveness.check_in(*task, if task == silent { 1000 } else { 1030 });
@@ -184,7 +170,7 @@ mod tests {
         let liveness = Liveness::new();
         let numbers: Vec<_> = (0..6).map(|_| liveness.enrol_operator()).collect();
         assert_eq!(numbers[3..], [TaskId::Operator(3); 3]);
-        for task in ALWAYS.into_iter().chain(numbers) {
+        for task in always().chain(numbers) {
             liveness.check_in(task, 500);
         }
         assert!(liveness.missed(500).is_nobody());
@@ -195,7 +181,7 @@ mod tests {
         let liveness = Liveness::new();
         let operator = liveness.enrol_operator();
         liveness.start(1000);
-        for task in ALWAYS.into_iter().take(4) {
+        for task in always().take(4) {
             liveness.check_in(task, 1000);
         }
         liveness.running(TaskId::Journal);
@@ -211,15 +197,15 @@ mod tests {
     #[test]
     fn the_task_that_blocks_the_tick_is_named() {
         let liveness = Liveness::new();
-        for (index, task) in ALWAYS.into_iter().enumerate().take(PERIODS.len()) {
+        for (index, task) in always().enumerate().take(SensorId::COUNT) {
             // Those before it have run in this tick, it and those behind it have not.
-            for other in ALWAYS {
+            for other in always() {
                 liveness.check_in(other, if other.index() < index { 702 } else { 700 });
             }
             liveness.start(702);
             assert_eq!(liveness.unfed(900), MissedCheckIns::task(task.index()));
         }
-        for task in ALWAYS {
+        for task in always() {
             liveness.check_in(task, 702);
         }
         assert_eq!(liveness.unfed(900), MissedCheckIns::STARVED);
@@ -228,7 +214,7 @@ mod tests {
         liveness.in_tick(false);
         // The angle is read every other tick alone.
         liveness.start(703);
-        for task in ALWAYS.into_iter().take(3) {
+        for task in always().take(3) {
             liveness.check_in(task, 703);
         }
         assert_eq!(liveness.unfed(900), MissedCheckIns::STARVED);

@@ -44,7 +44,7 @@ pub enum Event {
 }
 
 /// Crossing as the controller observed it.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct CrossingRecord {
     /// Step number, 1 at the outermost sleeve; 0 for a step that the table lacks.
     pub index: u8,

@@ -4,10 +4,46 @@ use crate::estimate::ContactStage;
 use crate::supervise::Mode;
 use crate::units::{Duty, Millimetres, MillimetresPerSecond, Newtons, Q16, Ratio, Tick};
 
-/// Declares the row: each quantity has one line, and its position in the binary log is that of
-/// the line.
+/// Passes the quantities of a row to the macro `$then`, behind what else it is given: each with its
+/// text, field and unit, its column in tables and the type there, the stage of the tick that gives
+/// it, and, if a plot of the report shows it, that plot and the name of its curve.
+///
+/// Their order is that in frames.
+#[macro_export]
+macro_rules! quantities {
+    ($then:ident $($given:tt)*) => {
+        $then! { $($given)*
+            /// Estimated axial position of the wheel centre, mm.
+            position: Millimetres, position_mm: f64, "odometry";
+            /// Estimated speed of the wheel, mm/s.
+            speed: MillimetresPerSecond, wheel_speed_mm_s: f64, "sensing", "speed" "estimated";
+            /// Speed reference, asked for by the profile, mm/s.
+            speed_ref: MillimetresPerSecond, speed_ref_mm_s: f64, "schedule", "speed" "reference";
+            /// Measured preload, N.
+            preload: Newtons, preload_n: f64, "sensing", "preload" "measured";
+            /// Preload reference, N.
+            preload_ref: Newtons, preload_ref_n: f64, "schedule", "preload" "reference";
+            /// Measured tread compression, mm.
+            compression: Millimetres, compression_mm: f64, "sensing", "compression" "measured";
+            /// Wheel centre's distance from the pillar axis by the arm angle, mm.
+            radius: Millimetres, radius_mm: f64, "sensing", "radius" "from the arm angle";
+            /// Gap predicted for the step ahead, mm.
+            gap_predicted: Millimetres, gap_predicted_mm: f64, "plan";
+            /// Friction left unused, by the model for the present contact.
+            slip_margin: Ratio, slip_margin: f64, "schedule", "slip margin" "planned";
+            /// Amplitude of the arm's mode: its largest since the approach to the latest step
+            /// began, mm.
+            vibration: Millimetres, vibration_mm: f64, "vibration";
+            /// Distance to the next face, mm; none, in the log 32767, when no face is left.
+            distance: Millimetres, distance_mm: Option<f64>, "contact";
+        }
+    };
+}
+
+/// Declares the row.
 macro_rules! telemetry {
-    ($($(#[$doc:meta])* $field:ident: $unit:ty,)*) => {
+    ($($(#[$doc:meta])* $field:ident: $unit:ty, $column:ident: $cell:ty, $stage:literal
+        $(, $plot:literal $curve:literal)?;)*) => {
         /// All control-rate quantities of one tick.
         #[derive(Clone, Copy, Debug, Default, PartialEq)]
         pub struct Telemetry {
@@ -27,8 +63,10 @@ macro_rules! telemetry {
         }
 
         impl Telemetry {
+            /// Columns of the quantities, in the order of their declaration.
+            pub const COLUMNS: &[&str] = &[$(stringify!($column)),*];
             /// Number of quantities.
-            pub const QUANTITIES: usize = [$(stringify!($field)),*].len();
+            pub const QUANTITIES: usize = Self::COLUMNS.len();
 
             /// The quantities, in the order of their declaration.
             pub const fn quantities(&self) -> [Q16; Self::QUANTITIES] {
@@ -43,29 +81,4 @@ macro_rules! telemetry {
         }
     };
 }
-
-telemetry! {
-    /// Estimated axial position, mm.
-    position: Millimetres,
-    /// Estimated speed, mm/s.
-    speed: MillimetresPerSecond,
-    /// Speed asked for by the profile, mm/s.
-    speed_ref: MillimetresPerSecond,
-    /// Measured preload, N.
-    preload: Newtons,
-    /// Preload asked for, N.
-    preload_ref: Newtons,
-    /// Measured tread compression, mm.
-    compression: Millimetres,
-    /// Wheel centre's distance from the pillar axis, from the arm angle, mm.
-    radius: Millimetres,
-    /// Gap predicted for the step ahead, mm.
-    gap_predicted: Millimetres,
-    /// Friction left unused, by the model for the present contact.
-    slip_margin: Ratio,
-    /// Amplitude of the arm's mode: its largest since the approach to the latest step
-    /// began, mm.
-    vibration: Millimetres,
-    /// Distance to the next corner touch, mm; 32767 when none is expected.
-    distance: Millimetres,
-}
+crate::quantities!(telemetry);

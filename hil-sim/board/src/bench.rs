@@ -19,6 +19,7 @@ use hil_sim::plant::sensors::{Codes, Sensors};
 use hil_sim::record::letter;
 use hil_sim::scenario::{Direction, Scenario};
 use hil_sim::session;
+use interstage::sense::raw::{EncoderCount, SensorId};
 
 use super::wiring::{Mistake, Wiring};
 
@@ -244,20 +245,16 @@ impl<'a> Bench<'a> {
     fn set_sensors(&mut self, codes: Codes) {
         let codes = self.wiring.codes(codes);
         // Noise on the lines can exceed the wheel's own speed.
-        let turned =
-            codes.wheel_encoder.since(self.codes.wheel_encoder).clamp(-MOST_COUNTS, MOST_COUNTS);
+        let [count, before] = [codes, self.codes]
+            .map(|codes| EncoderCount::new(codes.sensors[SensorId::WheelEncoder as usize]));
+        let turned = count.since(before).clamp(-MOST_COUNTS, MOST_COUNTS);
         self.wheel += i64::from(turned);
         self.codes = codes;
         let chip = self.machine.chip_mut();
         // The readback converts with 12 of the 16 bits.
         let bridges = [codes.bridges.drive, codes.bridges.pretightener].map(|code| code.get() << 4);
-        chip.set_analog([
-            codes.preload_sensor.get(),
-            codes.compression_sensor.get(),
-            bridges[0],
-            bridges[1],
-        ]);
-        chip.angle.angle = codes.arm_angle.get();
+        chip.set_analog(SensorId::ANALOG.map(|sensor| codes.sensors[sensor as usize]), bridges);
+        chip.angle.angle = codes.sensors[SensorId::ArmAngle as usize];
         chip.turn_wheel(self.wheel, STEP);
     }
 

@@ -27,7 +27,7 @@ use super::peripherals::time_base::TimeBase;
 pub use pins::{Bridge, Motor, Pin};
 pub use stray::{Stray, Strays, Why};
 
-use description::{ADC1, DBGMCU, EXTI, FLASH, GPIOA, GPIOG, PWR, SPI1, SYSCFG, TIM1, TIM8};
+use description::{ADC1, ADC3, DBGMCU, EXTI, FLASH, GPIOA, GPIOG, PWR, SPI1, SYSCFG, TIM1, TIM8};
 use description::{adc1, dbgmcu::*, spi1};
 use map::Place;
 
@@ -37,8 +37,8 @@ const SUPPLY_LINE: u32 = 16;
 /// `DBGMCU_IDCODE`: category 3, revision X.
 const DEBUG_IDENTITY: u32 = 0x2003_6469;
 
-/// Requests of the multiplexer: ADC1 and ADC2.
-const REQUESTS: [u32; 2] = [5, 36];
+/// Requests of the multiplexer: ADC1 to ADC4.
+const REQUESTS: [u32; 4] = [5, 36, 37, 38];
 
 /// Faults of the hardware that a test or a campaign can switch on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -49,9 +49,9 @@ pub struct Defects {
     pub encoder_swapped: bool,
     /// PWM and enable of the drive's bridge have no pull-down: high while nothing drives them.
     pub drive_bridge_floats: bool,
-    /// Codes, in parts of 2^16, that the inputs of preload sensor, compression sensor, drive's
-    /// and pre-tightener's bridge read instead of their voltages.
-    pub stuck_codes: [Option<u16>; 4],
+    /// Codes, in parts of 2^16, that the inputs of sensors and bridges read instead of their
+    /// voltages.
+    pub stuck_codes: [Option<u16>; pins::ANALOG.len()],
     /// The noise at the analogue inputs is below half a step of 12 bits: each conversion of a mean
     /// gives the same.
     pub quiet_inputs: bool,
@@ -84,9 +84,8 @@ pub struct Chip {
     encoder: Encoder,
     /// The timers of drive and pre-tightener.
     motors: [Pwm; 2],
-    adc: Adc,
-    /// ADC3 and ADC4; ADC3 reads the bridges.
-    readback: Adc,
+    /// ADC1 and ADC2, ADC3 and ADC4; ADC3 reads the bridges.
+    adcs: [Adc; 2],
     dma: Dma,
     mux: Registers,
     /// The angle sensor's bus.
@@ -100,7 +99,7 @@ pub struct Chip {
     deselected: bool,
     /// The wheel encoder's position, in quarters of a line pair.
     wheel: i64,
-    inputs: [u16; 4],
+    inputs: [u16; pins::ANALOG.len()],
     bridges: [Bridge; 2],
     /// Faults of the hardware.
     pub defects: Defects,
@@ -132,8 +131,7 @@ impl Chip {
             basic: TimeBase::basic(),
             encoder: Encoder::new([false; 2]),
             motors: [Pwm::new(false), Pwm::new(false)],
-            adc: Adc::default(),
-            readback: Adc::default(),
+            adcs: Default::default(),
             dma: Dma::default(),
             mux: dma::multiplexer(),
             spi: Spi::default(),
@@ -142,7 +140,7 @@ impl Chip {
             angle: AngleSensor::default(),
             deselected: false,
             wheel: 0,
-            inputs: [0; 4],
+            inputs: [0; pins::ANALOG.len()],
             bridges: [Bridge::default(); 2],
             defects: Defects::default(),
             locked_up: false,
@@ -195,8 +193,7 @@ impl Chip {
         self.system.advance(now);
         self.time.advance(now);
         self.basic.advance(now);
-        self.adc.advance(now);
-        self.readback.advance(now);
+        self.adcs.iter_mut().for_each(|pair| pair.advance(now));
         if let Some(frame) = self.spi.over(now) {
             let answer = self.exchange(frame);
             self.spi.answer(answer, now);
@@ -269,7 +266,7 @@ impl Chip {
         if self.defects.dma_stalled {
             return None;
         }
-        let requested = [0, 1].map(|converter| self.adc.wants_dma(converter));
+        let requested = [0, 1, 2, 3].map(|at: usize| self.adcs[at / 2].wants_dma(at % 2));
         if requested == [false; REQUESTS.len()] {
             return None;
         }
@@ -295,8 +292,8 @@ impl Chip {
     /// The same after an access to a register, for the lines that it can change.
     fn settle_after(&mut self, Place { block, offset }: Place, write: bool, now: u64) {
         // Reading a data register changes state.
-        let by_reading =
-            block.is(ADC1) && offset % 0x100 == adc1::DR || block.is(SPI1) && offset == spi1::DR;
+        let by_reading = (block.is(ADC1) || block.is(ADC3)) && offset % 0x100 == adc1::DR
+            || block.is(SPI1) && offset == spi1::DR;
         let is_port = (GPIOA.address..=GPIOG.address).contains(&block.base);
         let pins = [SYSCFG, TIM1, TIM8, EXTI, PWR, FLASH];
         if write && (is_port || pins.into_iter().any(|of| block.is(of))) {
@@ -342,8 +339,8 @@ impl Chip {
             self.basic.deadline(),
             self.motors[0].deadline(),
             self.motors[1].deadline(),
-            self.adc.deadline(),
-            self.readback.deadline(),
+            self.adcs[0].deadline(),
+            self.adcs[1].deadline(),
             self.spi.deadline(),
             self.watchdog.deadline(),
             self.flash.deadline(),

@@ -33,8 +33,8 @@ pub struct Loaded {
     pub code: Vec<Range<u32>>,
     /// Functions in the order of their addresses.
     pub functions: Vec<Function>,
-    /// Every symbol with its value.
-    symbols: BTreeMap<String, u32>,
+    /// Every symbol with its value and size.
+    symbols: BTreeMap<String, (u32, u32)>,
 }
 
 impl Loaded {
@@ -63,20 +63,23 @@ impl Loaded {
             return Err(ImageError::form("its code is not marked by mapping symbols"));
         }
         let named = |s: &object::read::elf::ElfSymbol32<'_, '_, _>| {
-            Some((s.name().ok()?.to_owned(), s.address() as u32))
+            Some((s.name().ok()?.to_owned(), (s.address() as u32, s.size() as u32)))
         };
         let symbols = file.symbols().filter_map(|s| named(&s)).collect();
         Ok(Loaded { flash, code, functions, symbols })
     }
 
-    /// Symbols with their values, in the order of their names.
-    pub fn symbols(&self) -> impl Iterator<Item = (&str, u32)> {
-        self.symbols.iter().map(|(name, value)| (name.as_str(), *value))
+    /// Symbols with their values and sizes, in the order of their names.
+    pub fn symbols(&self) -> impl Iterator<Item = (&str, u32, u32)> {
+        self.symbols.iter().map(|(name, (value, size))| (name.as_str(), *value, *size))
     }
 
     /// Value of a symbol.
     pub fn symbol(&self, name: &str) -> Result<u32, ImageError> {
-        self.symbols.get(name).copied().ok_or_else(|| ImageError::Missing(name.to_owned()))
+        self.symbols
+            .get(name)
+            .map(|(value, _)| *value)
+            .ok_or_else(|| ImageError::Missing(name.to_owned()))
     }
 }
 

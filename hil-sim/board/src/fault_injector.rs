@@ -10,7 +10,7 @@
 
 mod save;
 
-use interstage::sense::raw::{AdcCode, Sample, SensorFrame};
+use interstage::sense::raw::{SensorFrame, SensorId};
 
 use super::core::CoreError;
 use super::faults;
@@ -28,8 +28,8 @@ use interstage::rig::Rig;
 use save::Save;
 pub(crate) use save::Saving;
 
-/// Cycles into its poll at which a task hangs.
-const INTO_POLL: u64 = 100;
+/// Cycles into its poll at which a task hangs, before the shortest checks in.
+const INTO_POLL: u64 = 60;
 /// Milliseconds to wait for one poll function before the next is tried.
 const PATIENCE: u32 = 20;
 
@@ -165,35 +165,22 @@ impl BoardInjector {
 
     /// The codes at the pins in tick `now`, from those of sound sensors.
     pub(super) fn sensors(&mut self, machine: &mut Machine, codes: Codes, now: u32) -> Codes {
-        let mut frame = SensorFrame {
-            wheel_encoder: Some(Sample { code: codes.wheel_encoder, at: now }),
-            preload_sensor: Some(Sample { code: codes.preload_sensor, at: now }),
-            compression_sensor: Some(Sample { code: codes.compression_sensor, at: now }),
-            arm_angle: Some(Sample { code: codes.arm_angle, at: now }),
-            bridges: Some(codes.bridges),
-        };
+        let mut frame = SensorFrame::taken(now, codes.sensors);
+        frame.bridges = Some(codes.bridges);
         self.faults.sensors(&mut frame);
-        let bridge = |sample: Option<Sample<AdcCode>>| match sample {
-            Some(sample) if sample.at == now => sample.code,
-            _ => AdcCode::new(0),
-        };
-        let fresh = [frame.wheel_encoder.map(|s| s.at), frame.arm_angle.map(|s| s.at)];
-        let silent = fresh.map(|at| at != Some(now));
+        let fresh = |sensor: SensorId| frame[sensor].filter(|sample| sample.at == now);
+        let silent = [SensorId::WheelEncoder, SensorId::ArmAngle].map(|s| fresh(s).is_none());
         if silent != std::mem::replace(&mut self.silent, silent) {
             let chip = machine.chip_mut();
             chip.defects.encoder_lines = [silent[0]; 2];
             chip.angle.lost = silent[1];
         }
-        Codes {
-            wheel_encoder: frame
-                .wheel_encoder
-                .filter(|_| !silent[0])
-                .map_or(codes.wheel_encoder, |s| s.code),
-            preload_sensor: bridge(frame.preload_sensor),
-            compression_sensor: bridge(frame.compression_sensor),
-            arm_angle: frame.arm_angle.filter(|_| !silent[1]).map_or(codes.arm_angle, |s| s.code),
-            bridges: frame.bridges.unwrap_or_default(),
-        }
+        let sensors = SensorId::ALL.map(|sensor| {
+            let is_analog = SensorId::ANALOG.contains(&sensor);
+            let lost = if is_analog { 0 } else { codes.sensors[sensor as usize] };
+            fresh(sensor).map_or(lost, |sample| sample.code)
+        });
+        Codes { sensors, bridges: frame.bridges.unwrap_or_default() }
     }
 
     /// Noise on the host's line.
@@ -246,11 +233,13 @@ struct TaskSearch {
     /// Poll functions, of which one belongs to the task.
     places: Vec<u32>,
     tried: u32,
+    /// Tasks of a pool that came in its place.
+    others: usize,
 }
 
 impl TaskSearch {
     fn new(machine: &Machine, task: &'static str) -> Self {
-        Self { task, places: machine.tasks.polls().to_vec(), tried: 0 }
+        Self { task, places: machine.tasks.polls().to_vec(), tried: 0, others: 0 }
     }
 
     /// Runs to this cycle at most; returns whether the task hangs.
@@ -268,7 +257,12 @@ impl TaskSearch {
                 machine.hang()?;
                 return Ok(true);
             }
-            self.places.remove(0);
+            machine.run_on(machine.now() + 1)?;
+            self.others += 1;
+            if self.others == SensorId::ANALOG.len() {
+                self.others = 0;
+                self.places.remove(0);
+            }
         }
         Ok(false)
     }

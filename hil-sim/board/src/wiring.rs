@@ -7,7 +7,7 @@ use hil_sim::plant::draw::PlantParameters;
 use hil_sim::plant::rig::Drives;
 use hil_sim::plant::sensors::Codes;
 use interstage::rig::Rig;
-use interstage::sense::raw::{AdcCode, AngleFrame, BridgeCode, BridgeCodes};
+use interstage::sense::raw::{BridgeCode, BridgeCodes, SensorId};
 
 use super::chip::{Chip, Pin};
 
@@ -166,9 +166,10 @@ impl Wiring {
     /// What the board gets of what the sensors and bridges give.
     pub fn codes(&self, mut codes: Codes) -> Codes {
         codes.bridges = self.readback(codes.bridges);
-        codes.arm_angle = self.arm(codes.arm_angle);
-        let [mut preload, mut compression] =
-            [codes.preload_sensor, codes.compression_sensor].map(|code| i32::from(code.get()));
+        let arm = &mut codes.sensors[SensorId::ArmAngle as usize];
+        *arm = self.arm(*arm);
+        let places = [SensorId::PreloadSensor, SensorId::CompressionSensor].map(|s| s as usize);
+        let [mut preload, mut compression] = places.map(|at| i32::from(codes.sensors[at]));
         if self.has(Mistake::PreloadReversed) {
             preload = 2 * ZERO - preload;
         }
@@ -188,8 +189,8 @@ impl Wiring {
         if self.has(Mistake::SensorsExchanged) {
             std::mem::swap(&mut preload, &mut compression);
         }
-        let code = |code: i32| AdcCode::new(code.clamp(0, 65_535) as u16);
-        (codes.preload_sensor, codes.compression_sensor) = (code(preload), code(compression));
+        let code = |code: i32| code.clamp(0, 65_535) as u16;
+        (codes.sensors[places[0]], codes.sensors[places[1]]) = (code(preload), code(compression));
         codes
     }
 
@@ -221,8 +222,8 @@ impl Wiring {
     }
 
     /// The angle's frame with the magnet turned over at the stow end, or the zero elsewhere.
-    fn arm(&self, frame: AngleFrame) -> AngleFrame {
-        let mut code = i32::from(frame.get() & 0x3FFF);
+    fn arm(&self, frame: u16) -> u16 {
+        let mut code = i32::from(frame & 0x3FFF);
         if self.has(Mistake::ArmInwards) {
             code = 2 * self.stowed - code;
         }
@@ -230,7 +231,7 @@ impl Wiring {
             code += ANGLE_OFF;
         }
         let bits = (code & 0x3FFF) as u16;
-        AngleFrame::new(bits | ((bits.count_ones() & 1) as u16) << 15)
+        bits | ((bits.count_ones() & 1) as u16) << 15
     }
 }
 
@@ -245,6 +246,6 @@ mod tests {
         let mut wiring = Wiring::with(&[Mistake::ArmInwards]);
         wiring.build(&rig, &mut hil_sim::scenario::Scenario::default().plant());
         let code = stowed(&rig).round() as u16;
-        assert_eq!(wiring.arm(AngleFrame::new(code)).get() & 0x3FFF, code);
+        assert_eq!(wiring.arm(code) & 0x3FFF, code);
     }
 }

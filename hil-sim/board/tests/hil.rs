@@ -148,7 +148,8 @@ impl Rigged {
 
     /// A millisecond of both.
     fn tick(&mut self, line: &mut HostLine<'_>, tick: u32, command: Option<Command>) -> Taken {
-        self.given = session::read(&mut self.sensors, &self.plant).into();
+        let codes = session::read(&mut self.sensors, &self.plant);
+        self.given = Given::codes(codes.sensors, codes.bridges);
         let taken = line.tick(tick, self.given.with(command)).expect("goes");
         let (drive, preload) = taken.commands();
         self.plant.step(&session::drives(drive, preload), 1e-3).expect("moves");

@@ -20,11 +20,10 @@ use crate::common::elf;
 
 /// Functions of the source whose tasks run on the control tick's executor: their names
 /// are among what was inlined into the function that the executor calls.
-const ROOTS: [&str; 5] = [
+const ROOTS: [&str; 4] = [
     "interstage::tasks::motors::motors",
     "interstage::tasks::sensors::wheel_encoder",
-    "interstage::tasks::sensors::preload_sensor",
-    "interstage::tasks::sensors::compression_sensor",
+    "interstage::tasks::sensors::analog",
     "interstage::tasks::sensors::arm_angle",
 ];
 

@@ -4,6 +4,7 @@
 use hil_sim::faults::campaign::Case;
 use hil_sim::scenario::injection::{Kind, Target};
 use interstage::restart::{MissedCheckIns, Reset, Restart, Stopped};
+use interstage::sense::raw::SensorId;
 use interstage::supervise::Mode;
 use interstage::units::Direction;
 use rig_board::bench::STEP;
@@ -72,10 +73,10 @@ fn a_hard_fault_is_reported_with_where_and_why() {
     assert!(restart.snapshot.is_some());
 }
 
-/// Tasks by their functions in `main.rs`, their names in the record, and cycles into the middle
-/// of a poll.
+/// Tasks by their functions in `main.rs`, those of converters by their sensors, their names in the
+/// record, and cycles into the middle of a poll, before the task checks in.
 const TASKS: [(&str, &str, u64); 8] = [
-    ("wheel_encoder", "wheel encoder", 90),
+    ("wheel_encoder", "wheel encoder", 60),
     ("preload_sensor", "preload sensor", 130),
     ("compression_sensor", "compression sensor", 130),
     ("arm_angle", "arm angle", 60),
@@ -89,12 +90,19 @@ const TASKS: [(&str, &str, u64); 8] = [
 fn into_poll(board: &mut Board, task: &str, cycles: u64) {
     let polls = board.machine().tasks.polls().to_vec();
     for poll in polls {
+        // Tasks of a pool have one function.
+        let mut others = 0;
         for _ in 0..60 {
             let machine = board.machine();
             let until = (machine.now() / STEP + 1) * STEP;
             if machine.run_to(poll, until).expect("runs") {
                 if machine.task() != Some(task) {
-                    break;
+                    machine.run_on(machine.now() + 1).expect("runs");
+                    others += 1;
+                    if others == SensorId::ANALOG.len() {
+                        break;
+                    }
+                    continue;
                 }
                 machine.run_on(machine.now() + cycles).expect("runs");
                 // A poll that only restarts its timer is over by now.

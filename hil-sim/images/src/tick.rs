@@ -1,9 +1,7 @@
 //! One control tick as words: its input, and the compared part of its output.
 
 use interstage::model::Plan;
-use interstage::sense::raw::{
-    AdcCode, AngleFrame, BridgeCode, BridgeCodes, EncoderCount, Sample, SensorFrame,
-};
+use interstage::sense::raw::{BridgeCode, BridgeCodes, Sample, SensorFrame, SensorId};
 use interstage::supervise::Command;
 use interstage::tick::{Input, Output};
 
@@ -18,8 +16,8 @@ pub type Code = [u32; 3];
 pub struct Given {
     /// Time, ticks.
     pub now: u32,
-    /// Wheel encoder, preload sensor, compression sensor, arm angle.
-    pub codes: [Code; 4],
+    /// Codes of the sensors, by [`SensorId`].
+    pub codes: [Code; SensorId::COUNT],
     /// Codes of the bridges of drive and pre-tightener in low and high half, or
     /// [`NO_BRIDGES`].
     pub bridges: u32,
@@ -72,28 +70,17 @@ impl Preset {
     }
 }
 
-fn code<T>(sample: Option<Sample<T>>, get: impl Fn(T) -> u16) -> Code {
-    sample.map_or([0; 3], |s| [1, get(s.code).into(), s.at])
-}
-
-fn sample<T>(code: &Code, new: impl Fn(u16) -> T) -> Option<Sample<T>> {
-    let [valid, code, at] = *code;
-    (valid != 0).then(|| Sample { code: new(code as u16), at })
-}
-
 impl Given {
+    /// Words in the image's memory.
+    pub const WORDS: usize = 5 + 3 * SensorId::COUNT;
+
     pub fn of(input: &Input) -> Self {
         let frame = input.sensors;
         let position =
             |command| Command::ALL.iter().position(|c| *c == command).map_or(0, |at| at as u32 + 1);
         Self {
             now: input.now,
-            codes: [
-                code(frame.wheel_encoder, EncoderCount::get),
-                code(frame.preload_sensor, AdcCode::get),
-                code(frame.compression_sensor, AdcCode::get),
-                code(frame.arm_angle, AngleFrame::get),
-            ],
+            codes: frame.samples.map(|s| s.map_or([0; 3], |s| [1, s.code.into(), s.at])),
             bridges: frame.bridges.map_or(NO_BRIDGES, |codes| {
                 u32::from(codes.drive.get()) | u32::from(codes.pretightener.get()) << 16
             }),
@@ -104,14 +91,12 @@ impl Given {
     }
 
     pub fn input(&self, plan: Option<Plan>) -> Input {
-        let [wheel, preload, compression, arm] = &self.codes;
         Input {
             now: self.now,
             sensors: SensorFrame {
-                wheel_encoder: sample(wheel, EncoderCount::new),
-                preload_sensor: sample(preload, AdcCode::new),
-                compression_sensor: sample(compression, AdcCode::new),
-                arm_angle: sample(arm, AngleFrame::new),
+                samples: self.codes.map(|[valid, code, at]| {
+                    (valid != 0).then_some(Sample { code: code as u16, at })
+                }),
                 bridges: (self.bridges != NO_BRIDGES).then_some(BridgeCodes {
                     drive: BridgeCode::new(self.bridges as u16),
                     pretightener: BridgeCode::new((self.bridges >> 16) as u16),
@@ -126,12 +111,13 @@ impl Given {
     }
 
     /// The words in the image's memory.
-    pub fn words(&self) -> [u32; 17] {
-        let mut words = [0; 17];
-        words[0] = self.now;
-        words[1..13].copy_from_slice(self.codes.as_flattened());
-        let rest = [self.bridges, self.command, self.overrun, self.emergency_stop];
-        words[13..].copy_from_slice(&rest);
+    pub fn words(&self) -> [u32; Self::WORDS] {
+        let mut words = [0; Self::WORDS];
+        let (first, rest) = words.split_at_mut(Self::WORDS - 4);
+        first[0] = self.now;
+        first[1..].copy_from_slice(self.codes.as_flattened());
+        let last = [self.bridges, self.command, self.overrun, self.emergency_stop];
+        rest.copy_from_slice(&last);
         words
     }
 }
@@ -162,19 +148,14 @@ mod tests {
 
     #[test]
     fn an_input_survives_its_words() {
-        let at = 7;
+        let mut sensors = SensorFrame::taken(7, [65_535, 0, 1, 0x8001]);
+        sensors[SensorId::PreloadSensor] = None;
+        sensors[SensorId::ArmAngle].iter_mut().for_each(|sample| sample.at = 6);
+        let (drive, pretightener) = (BridgeCode::new(4095), BridgeCode::new(7));
+        sensors.bridges = Some(BridgeCodes { drive, pretightener });
         let input = Input {
             now: 9,
-            sensors: SensorFrame {
-                wheel_encoder: Some(Sample { code: EncoderCount::new(65_535), at }),
-                preload_sensor: None,
-                compression_sensor: Some(Sample { code: AdcCode::new(1), at }),
-                arm_angle: Some(Sample { code: AngleFrame::new(0x8001), at: 6 }),
-                bridges: Some(BridgeCodes {
-                    drive: BridgeCode::new(4095),
-                    pretightener: BridgeCode::new(7),
-                }),
-            },
+            sensors,
             command: Some(Command::Retract),
             service: None,
             plan: None,
@@ -189,6 +170,6 @@ mod tests {
     #[test]
     fn the_words_have_the_order_of_the_structure() {
         assert_eq!(size_of::<Given>(), size_of_val(&Given::default().words()));
-        assert_eq!(core::mem::offset_of!(Given, command), 14 * 4);
+        assert_eq!(core::mem::offset_of!(Given, command), (2 + 3 * SensorId::COUNT) * 4);
     }
 }

@@ -52,7 +52,7 @@ pub struct Args {
     #[arg(long, conflicts_with = "out")]
     no_files: bool,
 
-    /// Every column of the table of crossings.
+    /// Every column of the table of crossings; with --target board the flash's wait states, too
     #[arg(short, long)]
     pub verbose: bool,
 

@@ -270,6 +270,7 @@ impl Judge {
 
 #[cfg(test)]
 mod tests {
+    use interstage::sense::raw::SensorId;
     use interstage::supervise::Leg;
     use interstage::tick::Entry;
     use interstage::units::{MotorCommand, Q16};
@@ -351,7 +352,7 @@ mod tests {
             }
             (judge.finding(&[], 1.0, true), judge.report(&[]).map(|(_, code)| code))
         };
-        let finding = |codes: &[u16]| of(Target::Encoder, Kind::Gain, codes);
+        let finding = |codes: &[u16]| of(Target::Sensor(SensorId::WheelEncoder), Kind::Gain, codes);
         assert_eq!(finding(&[125]), (Finding::Found, Some(125)));
         assert_eq!(finding(&[136]), (Finding::Otherwise, Some(136)));
         assert_eq!(finding(&[219]), (Finding::Otherwise, Some(219)));

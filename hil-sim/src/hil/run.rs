@@ -56,7 +56,7 @@ pub fn run(
     while !over(mode) && f64::from(tick - FIRST) * TICK_S < longest_s(&scenario.rig) {
         let codes = read(&mut sensors, &plant);
         let command = if mode == Mode::Idle { start.take() } else { None };
-        given = Given::from(codes).with(command);
+        given = Given::codes(codes.sensors, codes.bridges).with(command);
         let taken = line.tick(tick, given)?;
         mode = taken.mode().unwrap_or(mode);
         log.add(plant.truth());

@@ -7,7 +7,7 @@ use std::f64::consts::TAU;
 use std::path::Path;
 
 use interstage::sense::angle;
-use interstage::sense::raw::{EncoderCount, SensorFrame};
+use interstage::sense::raw::{AngleFrame, EncoderCount, SensorFrame, SensorId};
 use interstage::supervise::Mode;
 
 use super::IdentifyError;
@@ -161,14 +161,17 @@ impl Reader {
 
     /// The sample of a tick: what the sensors said before it, and its duties.
     pub fn sample(&mut self, frame: &SensorFrame, driven: &Drives) -> Sample {
-        if let Some(wheel) = frame.wheel_encoder {
+        if let Some(wheel) = frame.get(SensorId::WheelEncoder, EncoderCount::new) {
             let since = self.wheel.map_or_else(|| wheel.code.get() as i16, |b| wheel.code.since(b));
             self.counts += i64::from(since);
             self.wheel = Some(wheel.code);
         }
-        let bridge = |code: u16| (f64::from(code) / CONVERTER - BRIDGE.0) / BRIDGE.1;
-        let new = frame.arm_angle.filter(|arm| self.angle_at != Some(arm.at));
-        self.angle_at = frame.arm_angle.map(|arm| arm.at);
+        let bridge = |sensor: SensorId| {
+            frame[sensor].map_or(0.0, |s| (f64::from(s.code) / CONVERTER - BRIDGE.0) / BRIDGE.1)
+        };
+        let arm = frame.get(SensorId::ArmAngle, AngleFrame::new);
+        let new = arm.filter(|arm| self.angle_at != Some(arm.at));
+        self.angle_at = arm.map(|arm| arm.at);
         // A frame that fails its parity is no reading.
         let arm_rad = new.and_then(|arm| angle::decode(arm.code).ok()).map(|code| {
             let turned = (f64::from(code) - self.angle_zero_code) / 16_384.0;
@@ -176,10 +179,8 @@ impl Reader {
         });
         Sample {
             counts: self.counts as f64,
-            preload_n: self.preload_sensor_n
-                * frame.preload_sensor.map_or(0.0, |c| bridge(c.code.get())),
-            compression_mm: self.tread_mm
-                * frame.compression_sensor.map_or(0.0, |c| bridge(c.code.get())),
+            preload_n: self.preload_sensor_n * bridge(SensorId::PreloadSensor),
+            compression_mm: self.tread_mm * bridge(SensorId::CompressionSensor),
             arm_rad,
             drive: driven.drive,
             drive_on: driven.drive_on,
@@ -216,25 +217,18 @@ mod tests {
 
     #[test]
     fn codes_become_what_the_sensors_measure() {
-        use interstage::sense::raw::{AdcCode, AngleFrame, Sample as At};
+        use interstage::sense::raw::Sample as At;
         let mut reader = Reader::new(&Scenario::default());
-        let mut frame = SensorFrame {
-            wheel_encoder: Some(At { code: EncoderCount::new(65_530), at: 0 }),
-            preload_sensor: Some(At { code: AdcCode::new((0.475f64 * CONVERTER) as u16), at: 0 }),
-            compression_sensor: Some(At {
-                code: AdcCode::new((0.05f64 * CONVERTER) as u16),
-                at: 0,
-            }),
-            // 2000 + 2048 has seven bits: the parity bit is set.
-            arm_angle: Some(At { code: AngleFrame::new(0x8000 | 4048), at: 0 }),
-            bridges: None,
-        };
+        let bridge = |part: f64| (part * CONVERTER) as u16;
+        // 2000 + 2048 has seven bits: the parity bit is set.
+        let codes = [65_530, bridge(0.475), bridge(0.05), 0x8000 | 4048];
+        let mut frame = SensorFrame::taken(0, codes);
         let first = reader.sample(&frame, &Drives::default());
         assert_eq!(first.counts, -6.0);
         assert!((first.preload_n - 100.0).abs() < 0.005, "{}", first.preload_n);
         assert!(first.compression_mm.abs() < 1e-4);
         assert!((first.arm_rad.unwrap() - TAU / 8.0).abs() < 1e-12);
-        frame.wheel_encoder = Some(At { code: EncoderCount::new(4), at: 1 });
+        frame[SensorId::WheelEncoder] = Some(At { code: 4, at: 1 });
         let second = reader.sample(&frame, &Drives::default());
         assert_eq!((second.counts, second.arm_rad), (4.0, None));
     }

@@ -393,6 +393,25 @@ mod tests {
     }
 
     #[test]
+    fn a_wheel_of_any_size_that_turns_at_its_corner_slips() {
+        for (radius, height, from) in [(25.0, 4.0, 84.0), (100.0, 8.0, 53.8)] {
+            let mut scenario = Scenario::default();
+            let rig = &mut scenario.rig.rig;
+            (rig.wheel_radius_mm, rig.step_height_mm) = (radius, height);
+            rig.step_positions_mm = [100.0].into();
+            let turns = |t: f64| 30.0 * t * 8192.0 / (TAU * radius);
+            let ticked = turning(4000, turns).into_iter().zip(0..).map(|(s, n)| {
+                let arm_rad = Some(if n < 3000 { 1.0 } else { 1.01 });
+                (n, Sample { arm_rad, pretightener_on: true, ..s })
+            });
+            let record = Record::new("b", scenario, ticked).unwrap();
+            let traces = Traces::of(&record).unwrap();
+            let onset = traces.onset_of_slip(&record).expect("it slips");
+            assert!((traces.turn_rad[onset] * radius - from).abs() < 0.2, "{onset}");
+        }
+    }
+
+    #[test]
     fn a_log_without_information_is_refused() {
         let refused = |samples: Vec<Sample>| {
             let ticked = samples.into_iter().enumerate().map(|(n, s)| (n as u32, s));

@@ -5,19 +5,15 @@
 
 use std::collections::VecDeque;
 
-use interstage::rig::Sensors;
-use interstage::sense::analog::{FULL_AT, ZERO_AT};
+use interstage::rig::Rig;
 use interstage::sense::angle::decode;
-use interstage::sense::raw::{AdcCode, AngleFrame, BridgeCode, EncoderCount, Sample, SensorFrame};
+use interstage::sense::raw::{AngleFrame, BridgeCode, BridgeCodes, EncoderCount, SensorFrame};
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
+use crate::plant::sensors::{Coding, SENSORS};
 use crate::scenario::injection::{Kind, Target};
 
-/// Largest code of a converter.
-const SPAN: f64 = 65_535.0;
-/// Codes of a turn of the angle sensor.
-const TURN: f64 = 16_384.0;
 /// Largest code of a bridge, and the codes of a duty of one.
 const BRIDGE: (f64, f64) = (4095.0, 32_768.0 / BridgeCode::DUTY as f64);
 /// Rounding error of sums of milliseconds, s.
@@ -46,23 +42,11 @@ pub(super) struct FaultySensor {
 }
 
 impl FaultySensor {
-    /// A sensor of `rig` whose wheel has this circumference, mm.
-    pub(super) fn new(
-        target: Target,
-        kind: Kind,
-        magnitude: f64,
-        rig: &Sensors,
-        turn_mm: f64,
-    ) -> Self {
-        let bridge = |full_scale: f64| (FULL_AT - ZERO_AT) * SPAN / full_scale;
+    /// A sensor of `rig`, or a readback.
+    pub(super) fn new(target: Target, kind: Kind, magnitude: f64, rig: &Rig) -> Self {
         let (per_unit, zero) = match target {
-            Target::PreloadSensor => (bridge(rig.preload_full_scale_n), ZERO_AT * SPAN),
-            Target::CompressionSensor => (bridge(rig.tread_full_scale_mm), ZERO_AT * SPAN),
-            Target::Angle => (TURN / 360.0, rig.angle_zero_code),
-            Target::DriveReadback | Target::PretightenerReadback => {
-                (BRIDGE.1, f64::from(BridgeCode::CENTRE))
-            }
-            _ => (rig.encoder_counts / turn_mm, 0.0),
+            Target::Sensor(sensor) => (SENSORS[sensor as usize].scale)(rig),
+            _ => (BRIDGE.1, f64::from(BridgeCode::CENTRE)),
         };
         let magnitude = if kind == Kind::Offset { magnitude * per_unit } else { magnitude };
         Self {
@@ -110,16 +94,14 @@ impl FaultySensor {
         self.held = *frame;
         if self.kind == Kind::Garbage {
             let code: u16 = random.random();
-            self.put(frame, if self.target.is_readback() { code & 0xFFF } else { code });
+            self.put(frame, code);
             return;
         }
         let first = *self.first.get_or_insert(self.last.map_or(truth, |(_, code)| code));
         let given = match self.kind {
             Kind::Stuck => first,
             // The counter has no zero of its own: it goes wrong from where it was.
-            Kind::Gain if self.target == Target::Encoder => {
-                first + (truth - first) * self.magnitude
-            }
+            Kind::Gain if self.counter.is_some() => first + (truth - first) * self.magnitude,
             Kind::Gain => self.zero + (truth - self.zero) * self.magnitude,
             Kind::Offset => truth + self.magnitude,
             Kind::Slow => {
@@ -153,101 +135,88 @@ impl FaultySensor {
 
     /// The sensor's number in this frame; none before the first, or if it is invalid.
     fn code(&mut self, frame: &SensorFrame) -> Option<f64> {
-        match self.target {
-            Target::PreloadSensor => frame.preload_sensor.map(|s| f64::from(s.code.get())),
-            Target::CompressionSensor => frame.compression_sensor.map(|s| f64::from(s.code.get())),
-            Target::Angle => decode(frame.arm_angle?.code).ok().map(f64::from),
-            Target::Readback => frame.bridges.map(|_| 0.0),
-            Target::DriveReadback => frame.bridges.map(|codes| codes.drive.get().into()),
-            Target::PretightenerReadback => {
-                frame.bridges.map(|codes| codes.pretightener.get().into())
-            }
-            _ => {
-                let code = frame.wheel_encoder?.code;
-                let (before, sum) = self.counter.unwrap_or((code, i64::from(code.get())));
-                let sum = sum + i64::from(code.since(before));
-                self.counter = Some((code, sum));
+        let Target::Sensor(sensor) = self.target else {
+            let mut codes = frame.bridges?;
+            return Some(readback(self.target, &mut codes).map_or(0.0, |code| code.get().into()));
+        };
+        let code = frame[sensor]?.code;
+        match SENSORS[sensor as usize].coding {
+            Coding::Converter => Some(code.into()),
+            Coding::Angle => decode(AngleFrame::new(code)).ok().map(f64::from),
+            Coding::Counter => {
+                let count = EncoderCount::new(code);
+                let (before, sum) = self.counter.unwrap_or((count, i64::from(code)));
+                let sum = sum + i64::from(count.since(before));
+                self.counter = Some((count, sum));
                 Some(sum as f64)
             }
         }
     }
 
     /// Puts in the code nearest to this number.
-    fn write(&self, frame: &mut SensorFrame, code: f64) {
-        let most = if self.target.is_readback() { BRIDGE.0 } else { SPAN };
+    fn write(&self, frame: &mut SensorFrame, number: f64) {
         let code = match self.target {
-            Target::Angle => {
-                let bits = (code.round() as i64 & 0x3fff) as u16;
-                bits | (bits.count_ones() as u16 & 1) << 15
-            }
-            Target::Encoder => code.floor() as i64 as u16,
-            _ => code.round().clamp(0.0, most) as u16,
+            Target::Sensor(sensor) => SENSORS[sensor as usize].coding.code(number),
+            _ => number.round().clamp(0.0, BRIDGE.0) as u16,
         };
         self.put(frame, code);
     }
 
     fn put(&self, frame: &mut SensorFrame, code: u16) {
-        match (self.target, &mut frame.bridges) {
-            (Target::PreloadSensor, _) => put(&mut frame.preload_sensor, AdcCode::new(code)),
-            (Target::CompressionSensor, _) => {
-                put(&mut frame.compression_sensor, AdcCode::new(code));
-            }
-            (Target::Angle, _) => put(&mut frame.arm_angle, AngleFrame::new(code)),
-            (Target::DriveReadback, Some(codes)) => codes.drive = BridgeCode::new(code),
-            (Target::PretightenerReadback, Some(codes)) => {
-                codes.pretightener = BridgeCode::new(code);
-            }
-            (Target::Encoder, _) => put(&mut frame.wheel_encoder, EncoderCount::new(code)),
-            _ => {}
+        if let Target::Sensor(sensor) = self.target {
+            frame[sensor].iter_mut().for_each(|sample| sample.code = code);
+        } else if let Some(old) =
+            frame.bridges.as_mut().and_then(|codes| readback(self.target, codes))
+        {
+            *old = BridgeCode::new(code & 0xFFF);
         }
     }
 
     /// Gives the sample before again.
     fn silence(&self, frame: &mut SensorFrame) {
         match self.target {
-            Target::PreloadSensor => frame.preload_sensor = self.held.preload_sensor,
-            Target::CompressionSensor => frame.compression_sensor = self.held.compression_sensor,
-            Target::Angle => frame.arm_angle = self.held.arm_angle,
-            target if target.is_readback() => frame.bridges = None,
-            _ => frame.wheel_encoder = self.held.wheel_encoder,
+            Target::Sensor(sensor) => frame[sensor] = self.held[sensor],
+            _ => frame.bridges = None,
         }
     }
 }
 
-fn put<T>(sample: &mut Option<Sample<T>>, code: T) {
-    if let Some(sample) = sample {
-        sample.code = code;
+/// The code of the bridge that this target is about; none for both.
+fn readback(target: Target, codes: &mut BridgeCodes) -> Option<&mut BridgeCode> {
+    match target {
+        Target::DriveReadback => Some(&mut codes.drive),
+        Target::PretightenerReadback => Some(&mut codes.pretightener),
+        _ => None,
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use interstage::rig::Rig;
-    use interstage::sense::raw::BridgeCodes;
+    use interstage::sense::raw::{Sample, SensorId};
     use rand::SeedableRng;
 
     use super::*;
 
     /// What the controller gets of a preload sensor that reads 10, 11, 12 ... N a millisecond.
     fn given(kind: Kind, magnitude: f64) -> Vec<f64> {
-        let rig = Rig::prototype().sense;
-        let mut sensor = FaultySensor::new(Target::PreloadSensor, kind, magnitude, &rig, 157.0);
+        let (rig, preload) = (Rig::prototype(), SensorId::PreloadSensor);
+        let mut sensor = FaultySensor::new(Target::Sensor(preload), kind, magnitude, &rig);
         let mut random = ChaCha8Rng::seed_from_u64(1);
-        let per_n = (FULL_AT - ZERO_AT) * SPAN / rig.preload_full_scale_n;
+        let (per_n, zero) = (SENSORS[preload as usize].scale)(&rig);
         (0..40u32)
             .map(|tick| {
                 let force = 10.0 + f64::from(tick);
-                let code = AdcCode::new((ZERO_AT * SPAN + force * per_n).round() as u16);
-                let preload_sensor = Some(Sample { code, at: tick });
-                let mut frame = SensorFrame { preload_sensor, ..SensorFrame::default() };
+                let code = (zero + force * per_n).round() as u16;
+                let mut frame = SensorFrame::default();
+                frame[preload] = Some(Sample { code, at: tick });
                 let t_s = f64::from(tick) * 1e-3;
                 let since_s = (tick >= 20).then_some(t_s - 0.020);
                 sensor.read(&mut frame, t_s, since_s, &mut random);
-                let sample = frame.preload_sensor.expect("a sample");
+                let sample = frame[preload].expect("a sample");
                 if sample.at < tick {
                     return f64::NAN;
                 }
-                (f64::from(sample.code.get()) - ZERO_AT * SPAN) / per_n
+                (f64::from(sample.code) - zero) / per_n
             })
             .collect()
     }
@@ -263,11 +232,11 @@ mod tests {
 
     #[test]
     fn a_readback_is_wrong_about_its_bridge_alone_and_falls_silent_with_both() {
-        let rig = Rig::prototype().sense;
+        let rig = Rig::prototype();
         let mut random = ChaCha8Rng::seed_from_u64(1);
         let codes = BridgeCodes { drive: BridgeCode::of(3277), pretightener: BridgeCode::of(0) };
         let mut given = |target, kind, magnitude| {
-            let mut sensor = FaultySensor::new(target, kind, magnitude, &rig, 157.0);
+            let mut sensor = FaultySensor::new(target, kind, magnitude, &rig);
             let mut frame = SensorFrame { bridges: Some(codes), ..SensorFrame::default() };
             sensor.read(&mut frame, 0.0, None, &mut random);
             sensor.read(&mut frame, 1e-3, Some(0.0), &mut random);

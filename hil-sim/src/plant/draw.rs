@@ -8,7 +8,8 @@ use rand_distr::{Distribution, StandardNormal};
 use super::actuators::{DriveMotor, Pretightener};
 use super::arm::{Arm, ModeParameters};
 use super::ring::RingParameters;
-use super::spread::{Noise, Spread};
+use super::sensors::{Noise, SensorParameters};
+use super::spread::Spread;
 use super::wall::{Step, Wall};
 use super::wind_up::Shear;
 
@@ -84,33 +85,6 @@ pub struct PlantParameters {
     pub compression_compliance_mm_per_n: f64,
     /// Sensors as calibrated and as they are.
     pub sensors: SensorParameters,
-}
-
-/// Sensors of one plant.
-#[derive(Clone, Debug, PartialEq)]
-pub struct SensorParameters {
-    /// Encoder counts per turn.
-    pub counts_per_turn: f64,
-    /// Full scale at 90 % of the converter, N.
-    pub preload_full_scale_n: f64,
-    /// Gain error factor.
-    pub preload_sensor_gain: f64,
-    /// Full scale at 90 % of the converter, mm.
-    pub tread_full_scale_mm: f64,
-    /// Gain error factor.
-    pub tread_gain: f64,
-    /// Code with the arm along the pillar.
-    pub angle_zero_code: f64,
-    /// Zero error, rad.
-    pub angle_zero_rad: f64,
-    /// Gain error factors of the bridges' readback: supply, divider and reference.
-    pub readback_gain: [f64; 2],
-    /// Its zero errors, parts of the supply.
-    pub readback_zero: [f64; 2],
-    /// Factor of its time constant.
-    pub readback_lag: f64,
-    /// Noise and delays.
-    pub noise: Noise,
 }
 
 /// Draws from the spread. The order of the draws is part of what a seed means: a new

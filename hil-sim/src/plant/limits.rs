@@ -120,7 +120,8 @@ pub fn takes(ring: &RingParameters, step_mm: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::plant::spread::{Noise, Spread};
+    use crate::plant::sensors::Noise;
+    use crate::plant::spread::Spread;
     use interstage::rig::Rig;
 
     fn of(rig: &Rig) -> PlantParameters {

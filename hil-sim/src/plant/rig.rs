@@ -20,8 +20,9 @@ use super::ring::{Ring, Work};
 use super::rolling::{self, Steady};
 use super::wind_up::WindUp;
 
+pub use super::truth::Truth;
 pub use energy::Energy;
-pub use truth::{PlantError, Truth};
+pub use truth::PlantError;
 
 /// How much farther the screw retreats than each step is high, mm.
 const STEP_ROOM_MM: f64 = 1.0;

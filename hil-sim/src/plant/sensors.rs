@@ -1,51 +1,192 @@
-//! The four sensors and the readback of the bridges: from what is true to the codes that the
-//! converters give.
+//! The sensors and the readback of the bridges: from what is true to the codes that the
+//! converters give. A sensor is an entry of [`SENSORS`], with its noise in [`Noise`].
 
 use std::collections::VecDeque;
+use std::f64::consts::TAU;
 
-use interstage::hal::hil::Given;
-use interstage::sense::raw::{AdcCode, AngleFrame, BridgeCode, BridgeCodes, EncoderCount};
+use documented::DocumentedFields;
+use interstage::rig::Rig;
+use interstage::sense::raw::{BridgeCode, BridgeCodes, Sample, SensorFrame, SensorId};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
+use serde::{Deserialize, Serialize};
 
-use super::draw::SensorParameters;
+use super::spread::{Field, Section, section};
+use super::truth::Truth;
 
-/// What the sensors look at.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Sensed {
-    /// Angle the wheel has turned, rad.
-    pub rotation_rad: f64,
-    /// Radial preload, N.
-    pub preload_n: f64,
-    /// Largest tread depth, mm.
-    pub depth_mm: f64,
-    /// Arm angle from the pillar, rad.
-    pub arm_rad: f64,
-    /// Outputs of the bridges of drive and pre-tightener since the last call, parts of the
-    /// nominal supply.
-    pub bridges: [f64; 2],
+/// Form of a sensor's code.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Coding {
+    /// A counter that wraps.
+    Counter,
+    /// A converter, from 0 to 65535.
+    Converter,
+    /// A frame of the magnetic encoder: 14 bits of angle, an error flag, even parity.
+    Angle,
+}
+
+impl Coding {
+    /// The code nearest to this number.
+    pub fn code(self, number: f64) -> u16 {
+        match self {
+            Self::Counter => number.floor() as i64 as u16,
+            Self::Converter => number.round().clamp(0.0, SPAN) as u16,
+            Self::Angle => {
+                let bits = (number.round() as i64 & 0x3fff) as u16;
+                bits | (bits.count_ones() as u16 & 1) << 15
+            }
+        }
+    }
+}
+
+/// A sensor of the plant, and how a fault distorts it.
+pub struct SensorModel {
+    pub coding: Coding,
+    /// The quantity that it measures.
+    truth: fn(&Truth) -> f64,
+    /// Age of a reading when it is handed over, s, and standard deviation of its noise.
+    noise: fn(&Noise) -> (f64, f64),
+    /// Its number in codes, of the quantity and its noise.
+    number: fn(&SensorParameters, f64, f64) -> f64,
+    /// Codes of a unit of an offset, and the code of zero.
+    pub scale: fn(&Rig) -> (f64, f64),
+    /// Faults: gain by default; offset by default and at most, its unit and what it does.
+    pub faults: (f64, (f64, f64, &'static str, &'static str)),
+    /// Codes of faults and limits that name the sensor.
+    pub reports: &'static [u16],
+}
+
+/// Largest code of a converter.
+pub const SPAN: f64 = 65_535.0;
+/// Codes of a turn of the angle sensor.
+const TURN: f64 = 16_384.0;
+/// Part of the converter's range at which a bridge reads zero.
+const ZERO: f64 = 0.05;
+/// Part of the converter's range at which it reads full scale.
+const FULL: f64 = 0.90;
+/// An offset of a quantity.
+pub const MORE: &str = "reads so much more than is true";
+
+/// Number of a converter at a bridge at this part of its full scale.
+fn bridge(part: f64) -> f64 {
+    (ZERO + (FULL - ZERO) * part) * SPAN
+}
+
+/// Codes of a unit, and of zero, of a bridge of this full scale.
+fn bridge_scale(full_scale: f64) -> (f64, f64) {
+    ((FULL - ZERO) * SPAN / full_scale, ZERO * SPAN)
+}
+
+/// Every sensor, by [`SensorId`].
+pub static SENSORS: [SensorModel; SensorId::COUNT] = [
+    SensorModel {
+        coding: Coding::Counter,
+        truth: |t| t.rotation_rad,
+        noise: |n| (0.0, n.wheel_encoder_jitter_counts),
+        number: |p, rad, noise| rad / TAU * p.counts_per_turn + noise,
+        scale: |rig| (rig.sense.encoder_counts / (TAU * rig.rig.wheel_radius_mm), 0.0),
+        faults: (1.5, (2.0, 100.0, "mm", "jumps by so much once")),
+        reports: &[101, 122, 123, 124, 125, 126, 131],
+    },
+    SensorModel {
+        coding: Coding::Converter,
+        truth: |t| t.preload_n,
+        noise: |n| (n.preload_sensor_delay_s, n.preload_sensor_n),
+        number: |p, n, noise| bridge((n * p.preload_sensor_gain + noise) / p.preload_full_scale_n),
+        scale: |rig| bridge_scale(rig.sense.preload_full_scale_n),
+        faults: (1.2, (6.0, 200.0, "N", MORE)),
+        reports: &[102, 112, 116, 120, 121, 127, 212],
+    },
+    SensorModel {
+        coding: Coding::Converter,
+        truth: |t| t.compression_mm,
+        noise: |n| (n.compression_sensor_delay_s, n.compression_sensor_mm),
+        number: |p, mm, noise| bridge((mm * p.tread_gain + noise) / p.tread_full_scale_mm),
+        scale: |rig| bridge_scale(rig.sense.tread_full_scale_mm),
+        faults: (1.2, (0.3, 5.0, "mm", MORE)),
+        reports: &[103, 113, 117, 208, 211, 212],
+    },
+    SensorModel {
+        coding: Coding::Angle,
+        truth: |t| t.arm_rad,
+        noise: |n| (n.arm_angle_delay_s, n.arm_angle_lsb),
+        number: |p, rad, noise| (rad + p.angle_zero_rad) / TAU * TURN + p.angle_zero_code + noise,
+        scale: |rig| (TURN / 360.0, rig.sense.angle_zero_code),
+        faults: (1.2, (1.0, 90.0, "deg", MORE)),
+        reports: &[104, 106, 114, 126, 131],
+    },
+];
+
+section! {
+    /// Noise of the sensors, one standard deviation, and their conversion delays. By default they
+    /// quantise, but have neither.
+    #[derive(Default)]
+    Noise {
+        /// Preload sensor, N.
+        preload_sensor_n: 0.05, (0.0, 10.0);
+        /// Compression sensor, mm.
+        compression_sensor_mm: 0.002, (0.0, 0.5);
+        /// Arm angle, steps of its 14-bit code.
+        arm_angle_lsb: 0.5, (0.0, 50.0);
+        /// Edges of the wheel encoder, counts.
+        wheel_encoder_jitter_counts: 0.0, (0.0, 10.0);
+        /// Age of a preload-sensor reading when it is handed over, s.
+        preload_sensor_delay_s: 0.000_5, (0.0, 0.02);
+        /// Age of a compression-sensor reading when it is handed over, s.
+        compression_sensor_delay_s: 0.000_5, (0.0, 0.02);
+        /// Age of an arm angle reading when it is handed over, s.
+        arm_angle_delay_s: 0.000_1, (0.0, 0.02);
+        /// Readback of the bridges, parts of the supply.
+        readback_duty: 0.002, (0.0, 0.1);
+    }
+}
+
+/// Sensors of one plant.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SensorParameters {
+    /// Encoder counts per turn.
+    pub counts_per_turn: f64,
+    /// Full scale at 90 % of the converter, N.
+    pub preload_full_scale_n: f64,
+    /// Gain error factor.
+    pub preload_sensor_gain: f64,
+    /// Full scale at 90 % of the converter, mm.
+    pub tread_full_scale_mm: f64,
+    /// Gain error factor.
+    pub tread_gain: f64,
+    /// Code with the arm along the pillar.
+    pub angle_zero_code: f64,
+    /// Zero error, rad.
+    pub angle_zero_rad: f64,
+    /// Gain error factors of the bridges' readback: supply, divider and reference.
+    pub readback_gain: [f64; 2],
+    /// Its zero errors, parts of the supply.
+    pub readback_zero: [f64; 2],
+    /// Factor of its time constant.
+    pub readback_lag: f64,
+    /// Noise and delays.
+    pub noise: Noise,
 }
 
 /// The codes of one millisecond.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Codes {
-    /// Wheel encoder.
-    pub wheel_encoder: EncoderCount,
-    /// Preload sensor.
-    pub preload_sensor: AdcCode,
-    /// Tread compression.
-    pub compression_sensor: AdcCode,
-    /// Arm angle.
-    pub arm_angle: AngleFrame,
+    /// By [`SensorId`].
+    pub sensors: [u16; SensorId::COUNT],
     /// Outputs of the bridges.
     pub bridges: BridgeCodes,
 }
 
-impl From<Codes> for Given {
-    fn from(codes: Codes) -> Self {
-        let Codes { wheel_encoder, preload_sensor, compression_sensor, arm_angle, bridges } = codes;
-        Self::codes(wheel_encoder, preload_sensor, compression_sensor, arm_angle, bridges)
+impl Codes {
+    /// Puts the codes of the sensors that are read in this tick into `frame`.
+    pub fn put(&self, frame: &mut SensorFrame, at: u32) {
+        for sensor in SensorId::ALL {
+            if at.is_multiple_of(SensorId::PERIODS[sensor as usize]) {
+                frame[sensor] = Some(Sample { code: self.sensors[sensor as usize], at });
+            }
+        }
+        frame.bridges = Some(self.bridges);
     }
 }
 
@@ -54,8 +195,8 @@ impl From<Codes> for Given {
 pub struct Sensors {
     parameters: SensorParameters,
     noise: ChaCha8Rng,
-    /// What was true at the last calls, newest first.
-    past: VecDeque<Sensed>,
+    /// The quantities of the last calls, newest first.
+    past: VecDeque<[f64; SensorId::COUNT]>,
     readback: Readback,
 }
 
@@ -92,11 +233,6 @@ impl Readback {
 /// Oldest reading that may be handed over, in calls.
 const LONGEST: usize = 256;
 
-/// Part of the converter's range at which a bridge reads zero.
-const ZERO: f64 = 0.05;
-/// Part of the converter's range at which it reads full scale.
-const FULL: f64 = 0.90;
-
 impl Sensors {
     /// Sensors whose noise follows `seed`.
     pub fn new(parameters: SensorParameters, seed: u64) -> Self {
@@ -111,54 +247,27 @@ impl Sensors {
 
     /// Codes of what is true now, `dt_s` after the last call; a reading handed over late
     /// is interpolated between the calls around its time.
-    pub fn read(&mut self, now: Sensed, dt_s: f64) -> Codes {
-        self.past.push_front(now);
+    pub fn read(&mut self, now: &Truth, dt_s: f64) -> Codes {
+        self.past.push_front(SENSORS.each_ref().map(|sensor| (sensor.truth)(now)));
         self.past.truncate(LONGEST);
         let (p, past) = (&self.parameters, &self.past);
-        let aged = |of: fn(&Sensed) -> f64, delay_s: f64| {
+        let sensors = SensorId::ALL.map(|sensor| {
+            let (place, sensor) = (sensor as usize, &SENSORS[sensor as usize]);
             let oldest = past.len() - 1;
+            let (delay_s, deviation) = (sensor.noise)(&p.noise);
             let back = (delay_s / dt_s).clamp(0.0, oldest as f64);
             let at = back as usize;
-            let (newer, older) = (of(&past[at]), of(&past[(at + 1).min(oldest)]));
-            newer + (older - newer) * (back - at as f64)
-        };
-        let noise = &p.noise;
-        let random = &mut self.noise;
-        let mut normal = |deviation: f64| {
-            if deviation == 0.0 {
-                return 0.0;
-            }
-            let normal: f64 = StandardNormal.sample(random);
-            deviation * normal
-        };
-        let preload = aged(|s| s.preload_n, noise.preload_sensor_delay_s) * p.preload_sensor_gain;
-        let depth = aged(|s| s.depth_mm, noise.compression_sensor_delay_s) * p.tread_gain;
-        let arm = aged(|s| s.arm_rad, noise.arm_angle_delay_s) + p.angle_zero_rad;
-        let turns = now.rotation_rad / std::f64::consts::TAU;
-        let counts = turns * p.counts_per_turn + normal(noise.wheel_encoder_jitter_counts);
-        let preload = preload + normal(noise.preload_sensor_n);
-        let depth = depth + normal(noise.compression_sensor_mm);
-        let code = arm / std::f64::consts::TAU * 16_384.0
-            + p.angle_zero_code
-            + normal(noise.arm_angle_lsb);
-        Codes {
-            wheel_encoder: EncoderCount::new((counts.floor() as i64) as u16),
-            preload_sensor: bridge(preload / p.preload_full_scale_n),
-            compression_sensor: bridge(depth / p.tread_full_scale_mm),
-            arm_angle: frame(code),
-            bridges: self.readback.read(now.bridges, &self.parameters, dt_s),
-        }
+            let (newer, older) = (past[at][place], past[(at + 1).min(oldest)][place]);
+            let truth = newer + (older - newer) * (back - at as f64);
+            // None is drawn for a sensor without noise.
+            let noise = if deviation == 0.0 {
+                0.0
+            } else {
+                let normal: f64 = StandardNormal.sample(&mut self.noise);
+                deviation * normal
+            };
+            sensor.coding.code((sensor.number)(p, truth, noise))
+        });
+        Codes { sensors, bridges: self.readback.read(now.bridges, &self.parameters, dt_s) }
     }
-}
-
-/// Converter code of a bridge at this part of its full scale.
-fn bridge(part: f64) -> AdcCode {
-    let code = (ZERO + (FULL - ZERO) * part) * 65_535.0;
-    AdcCode::new(code.round().clamp(0.0, 65_535.0) as u16)
-}
-
-/// Frame of the magnetic encoder: 14 bits of angle, no error, even parity.
-fn frame(code: f64) -> AngleFrame {
-    let bits = ((code.round() as i64) & 0x3fff) as u16;
-    AngleFrame::new(bits | (((bits.count_ones() & 1) as u16) << 15))
 }

@@ -1,5 +1,5 @@
 //! Sections of a scenario whose keys are numbers of the plant, a row a key: how far the plant
-//! may differ from the rig as the controller knows it, and how its sensors err.
+//! may differ from the rig as the controller knows it.
 
 use documented::DocumentedFields;
 use serde::{Deserialize, Serialize};
@@ -112,29 +112,5 @@ section! {
         readback_zero_duty: 0.002, (0.0, 0.1);
         /// Time constant of their readback, relative.
         readback_lag_rel: 0.05, (0.0, 0.3);
-    }
-}
-
-section! {
-    /// Noise of the sensors, one standard deviation, and their conversion delays. By default they
-    /// quantise, but have neither.
-    #[derive(Default)]
-    Noise {
-        /// Preload sensor, N.
-        preload_sensor_n: 0.05, (0.0, 10.0);
-        /// Compression sensor, mm.
-        compression_sensor_mm: 0.002, (0.0, 0.5);
-        /// Arm angle, steps of its 14-bit code.
-        arm_angle_lsb: 0.5, (0.0, 50.0);
-        /// Edges of the wheel encoder, counts.
-        wheel_encoder_jitter_counts: 0.0, (0.0, 10.0);
-        /// Age of a preload-sensor reading when it is handed over, s.
-        preload_sensor_delay_s: 0.000_5, (0.0, 0.02);
-        /// Age of a compression-sensor reading when it is handed over, s.
-        compression_sensor_delay_s: 0.000_5, (0.0, 0.02);
-        /// Age of an arm angle reading when it is handed over, s.
-        arm_angle_delay_s: 0.000_1, (0.0, 0.02);
-        /// Readback of the bridges, parts of the supply.
-        readback_duty: 0.002, (0.0, 0.1);
     }
 }

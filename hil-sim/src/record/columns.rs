@@ -2,6 +2,9 @@
 //! and what is wrong with it.
 
 use interstage::sense::raw::AngleFrame;
+use interstage::units::Q16;
+
+use super::Controller;
 
 /// Bits of an angle frame: the code, the sensor's error flag, the parity.
 pub(super) const ANGLE: u16 = 0x3FFF;
@@ -20,6 +23,50 @@ pub(super) fn angle_frame(code: u16, error: u8) -> AngleFrame {
     let bits = code & ANGLE | if error & 1 != 0 { ERROR_FLAG } else { 0 };
     let odd = !bits.count_ones().is_multiple_of(2);
     AngleFrame::new(bits | if odd != (error & 2 != 0) { PARITY } else { 0 })
+}
+
+/// A quantity of the controller.
+pub struct Column {
+    pub name: &'static str,
+    /// The stage of the tick that gives it.
+    pub stage: &'static str,
+    /// The plot that shows it and the name of its curve.
+    pub curve: Option<(&'static str, &'static str)>,
+    /// Its value, `NaN` if unknown.
+    pub of: fn(&Controller) -> f64,
+}
+
+/// A quantity in a column.
+pub(super) trait Cell: Copy {
+    /// Of a tick that did not run, or a log without the column.
+    const UNKNOWN: Self;
+    fn of(quantity: Q16) -> Self;
+    fn quantity(self) -> Option<Q16>;
+}
+
+impl Cell for f64 {
+    const UNKNOWN: Self = Self::NAN;
+
+    fn of(quantity: Q16) -> Self {
+        quantity.to_num()
+    }
+
+    fn quantity(self) -> Option<Q16> {
+        (!self.is_nan()).then(|| Q16::from_num(self))
+    }
+}
+
+/// None where the controller has the largest number.
+impl Cell for Option<f64> {
+    const UNKNOWN: Self = None;
+
+    fn of(quantity: Q16) -> Self {
+        (quantity != Q16::MAX).then(|| quantity.to_num())
+    }
+
+    fn quantity(self) -> Option<Q16> {
+        Some(self.map_or(Q16::MAX, Q16::from_num))
+    }
 }
 
 /// A column of names, from this number on.
@@ -72,19 +119,18 @@ pub(super) mod bit {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::record::Controller;
     use interstage::log::Record;
-    use interstage::sense::raw::{Sample, SensorFrame};
+    use interstage::sense::raw::{Sample, SensorFrame, SensorId};
 
     #[test]
     fn every_frame_of_the_arm_comes_back_and_its_code_has_no_parity() {
         for bits in 0..=u16::MAX {
-            let sample = Sample { code: AngleFrame::new(bits), at: 9 };
-            let sensors = SensorFrame { arm_angle: Some(sample), ..SensorFrame::default() };
+            let mut sensors = SensorFrame::default();
+            sensors[SensorId::ArmAngle] = Some(Sample { code: bits, at: 9 });
             let tick = Controller::of(&Record::default(), &sensors);
             assert_eq!(tick.sensors(), sensors, "{bits:#06x}");
             assert_eq!(tick.arm_angle_code, Some(bits & 0x3FFF));
-            let is_good = interstage::sense::angle::decode(sample.code).is_ok();
+            let is_good = interstage::sense::angle::decode(AngleFrame::new(bits)).is_ok();
             assert_eq!(tick.arm_angle_error == 0, is_good, "{bits:#06x}");
         }
     }

@@ -95,8 +95,10 @@ fn words(names: &[&str]) -> Value {
 
 #[cfg(test)]
 mod tests {
+    use documented::DocumentedFields as _;
+
     use super::*;
-    use crate::record::write_csv;
+    use crate::record::{Controller, write_csv};
     use crate::report::example;
 
     #[test]
@@ -120,6 +122,18 @@ mod tests {
                 assert!(fits, "{cell} in {column}");
             }
         }
+    }
+
+    #[test]
+    fn the_page_lists_the_columns() {
+        let row = |column: &Value| {
+            let name = column["name"].as_str().unwrap();
+            let text = Controller::get_field_docs(name).unwrap().replace('\n', " ");
+            format!("| `{name}` | {text} |\n")
+        };
+        let table: String = columns(false).iter().map(row).collect();
+        let page = include_str!("../../../docs/LOGGING.md");
+        assert!(page.contains(&table), "docs/LOGGING.md lacks\n{table}");
     }
 
     #[test]

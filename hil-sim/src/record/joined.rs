@@ -54,10 +54,7 @@ impl JoinedLog {
             Item::Tick(mut record, mut codes) if record.at() >= *first => {
                 let from_first = |at: &mut Tick| *at = at.wrapping_sub(*first);
                 from_first(&mut record.telemetry.at);
-                codes.wheel_encoder.iter_mut().for_each(|sample| from_first(&mut sample.at));
-                codes.preload_sensor.iter_mut().for_each(|sample| from_first(&mut sample.at));
-                codes.compression_sensor.iter_mut().for_each(|sample| from_first(&mut sample.at));
-                codes.arm_angle.iter_mut().for_each(|sample| from_first(&mut sample.at));
+                codes.samples.iter_mut().flatten().for_each(|sample| from_first(&mut sample.at));
                 let at = record.at();
                 if at < *last {
                     *start = *latest;

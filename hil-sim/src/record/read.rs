@@ -202,7 +202,9 @@ fn of_csv(bytes: &[u8], metadata: TableMetadata) -> Result<Run, String> {
     let mut reader = csv::Reader::from_reader(bytes);
     let head = reader.headers().map_err(|error| error.to_string())?.clone();
     let columns = serde_json::to_value(Controller::default()).unwrap_or_default();
-    let lacks = |name: &&String| !head.iter().any(|found| found == name.as_str());
+    // A quantity that the table lacks is unknown; what the controller was given must be there.
+    let is_quantity = |name: &str| Controller::QUANTITIES.iter().any(|column| column.name == name);
+    let lacks = |name: &&String| !is_quantity(name) && !head.iter().any(|found| found == *name);
     if let Some((name, _)) = columns.as_object().into_iter().flatten().find(|(name, _)| lacks(name))
     {
         return Err(format!("it lacks the column {name}"));

@@ -323,6 +323,20 @@ mod tests {
     }
 
     #[test]
+    fn a_step_crossed_again_has_the_figures_of_its_own_report() {
+        let report = |gap: f64| CrossingRecord {
+            position: Q16::from_num(18.0),
+            gap_measured: Q16::from_num(gap),
+            ..CrossingRecord::default()
+        };
+        let reported = [(2.0, report(2.5)), (9.0, report(2.75))];
+        for (lift_s, gap) in [(1.9, 2.5), (8.8, 2.75)] {
+            let again = Crossing { lift_s, step_mm: 18.0, climbing: true, ..Crossing::default() };
+            assert_eq!(crossing_line(&again, &reported).gap_measured_mm, Some(gap));
+        }
+    }
+
+    #[test]
     fn only_ticks_under_way_count() {
         let mut recorder = RunRecorder::new(2.5, 0.0);
         let (_, plant) = at_rest();

@@ -3,20 +3,22 @@
 //! The fields of [`Controller`] and [`TrueState`] are the columns of CSV, MCAP and JSON; serde
 //! derives their names, order and schema.
 //!
-//! A new column of the plant is a field of [`TrueState`]. One of the controller is a line in
-//! `src/tick/telemetry.rs`, its value in `src/tick/report.rs`, its field in [`Controller`] with
-//! its value in `unknown`, `of` and `telemetry`, and its stage in `replay.rs`. It changes the binary layout: raise `SCHEMA` in
-//! `src/log/identity.rs` and record the runs in `hil-sim/tests/data` again.
+//! A new column of the plant is a field of [`TrueState`]. One of the controller is a line of
+//! `quantities` in `src/tick/telemetry.rs` and its value in `src/tick/report.rs`. It changes the
+//! layout of the log: record the runs in `hil-sim/tests/data` again.
 
+use documented::DocumentedFields;
 use interstage::log::{Flags, Record, codes};
-use interstage::sense::raw::{AdcCode, BridgeCode, BridgeCodes, EncoderCount, Sample, SensorFrame};
+use interstage::sense::raw::{AngleFrame, BridgeCode, BridgeCodes, Sample, SensorFrame, SensorId};
 use interstage::supervise::Mode;
 use interstage::tick::Telemetry;
 use interstage::units::{Duty, Q16};
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize};
 
-use super::columns::{ANGLE, angle_error, angle_frame, bit, mode_column, stage_column};
+use super::columns::{
+    ANGLE, Cell, Column, angle_error, angle_frame, bit, mode_column, stage_column,
+};
 use super::summary::nan;
 use crate::plant::rig::Truth;
 
@@ -108,90 +110,166 @@ impl<'de> Deserialize<'de> for Tick {
     }
 }
 
-/// The controller's sensor codes, estimates and outputs.
-///
-/// Every quantity is exact: the controller's fixed-point numbers are multiples of 2^-16,
-/// which an `f64` represents. What is unknown is `NaN`.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default)]
-pub struct Controller {
-    /// Ticks since boot, 1 ms each.
-    pub tick: u32,
-    /// Time since boot, s.
-    pub t_s: f64,
-    /// Number of the mode; its name of [`MODE_NAMES`] in the columns.
-    #[serde(with = "mode_column")]
-    pub mode: u8,
-    /// The mode is one of retraction.
-    #[serde(with = "bit")]
-    pub retracts: bool,
-    /// Code of the fault that is held; 0 for none.
-    pub fault: u8,
-    /// Contact stage, 1 to 6; its name of [`STAGE_NAMES`] in the columns.
-    #[serde(with = "stage_column")]
-    pub stage: u8,
-    /// Sleeve level: 0 at the outermost wall.
-    pub level: u8,
-    /// Code of the wheel encoder, 16 bits, wraps; none before the first.
-    pub wheel_encoder_code: Option<u16>,
-    /// When it was taken, ticks.
-    pub wheel_encoder_at: Option<u32>,
-    pub preload_code: Option<u16>,
-    /// When it was taken, ticks.
-    pub preload_at: Option<u32>,
-    pub compression_code: Option<u16>,
-    /// When it was taken, ticks.
-    pub compression_at: Option<u32>,
-    /// Code of the arm angle sensor, 14 bits, 16384 a turn.
-    pub arm_angle_code: Option<u16>,
-    /// What is wrong with its frame: 0 nothing, 1 the sensor's error flag is set, 2 the parity is
-    /// odd, 3 both.
-    pub arm_angle_error: u8,
-    /// When it was taken, ticks.
-    pub arm_angle_at: Option<u32>,
-    /// Code of the drive's bridge, 12 bits, 2048 without voltage; none if none was taken.
-    pub drive_code: Option<u16>,
-    /// Code of the pre-tightener's bridge.
-    pub pretightener_code: Option<u16>,
-    /// Number of the command that was given, from 1; 0 for none.
-    pub command: u8,
-    /// All other inputs and outputs of the tick as bits, see [`Flags`].
-    pub flags: u16,
-    /// Estimated axial position of the wheel centre, mm.
-    pub position_mm: f64,
-    /// Estimated speed of the wheel, mm/s.
-    pub wheel_speed_mm_s: f64,
-    /// Speed reference, mm/s.
-    pub speed_ref_mm_s: f64,
-    /// Measured preload, N.
-    pub preload_n: f64,
-    /// Preload reference, N.
-    pub preload_ref_n: f64,
-    /// Measured tread compression, mm.
-    pub compression_mm: f64,
-    /// Wheel centre's distance from the pillar axis by the arm angle, mm.
-    pub radius_mm: f64,
-    /// Gap predicted for the step ahead, mm.
-    pub gap_predicted_mm: f64,
-    /// Friction left unused, by the model.
-    pub slip_margin: f64,
-    /// Amplitude of the arm's mode, mm.
-    pub vibration_mm: f64,
-    /// Distance to the next face, mm; none when no face is left.
-    pub distance_mm: Option<f64>,
-    pub drive_duty: f64,
-    /// Duty of the pre-tightener, -1 to 1.
-    pub pretightener_duty: f64,
-    /// The drive's bridge is on.
-    #[serde(with = "bit")]
-    pub drive_on: bool,
-    /// The pre-tightener's bridge is on.
-    #[serde(with = "bit")]
-    pub pretightener_on: bool,
+/// One in the format of a duty.
+const DUTY: f64 = 32_768.0;
+
+macro_rules! with_quantities {
+    ($($sensors:tt)*) => { interstage::quantities!(controller { $($sensors)* }); };
 }
 
-/// The controller's distance when no face is left.
-const NO_FACE: Q16 = Q16::MAX;
+/// Declares the columns of sensors and quantities, and what is made of them.
+macro_rules! controller {
+    ({ $($(#[$about:meta])* $id:ident $called:literal $fault:literal, $period:literal:
+        $code:ident $(($error:ident))?, $at:ident;)* }
+    $($(#[$doc:meta])* $field:ident: $unit:ty, $column:ident: $cell:ty, $stage:literal
+        $(, $plot:literal $curve:literal)?;)*) => {
+        /// The controller's sensor codes, estimates and outputs.
+        ///
+        /// Every quantity is exact: the controller's fixed-point numbers are multiples of 2^-16,
+        /// which an `f64` represents. What is unknown, or absent in a log, is `NaN`.
+        #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, DocumentedFields)]
+        #[serde(default)]
+        pub struct Controller {
+            /// Ticks since boot, 1 ms each.
+            pub tick: u32,
+            /// Time since boot, s.
+            pub t_s: f64,
+            /// Mode, by its number and in tables by name.
+            #[serde(with = "mode_column")]
+            pub mode: u8,
+            /// The mode is one of retraction.
+            #[serde(with = "bit")]
+            pub retracts: bool,
+            /// Code of the fault that is held; 0 for none.
+            pub fault: u8,
+            /// Contact stage, by its number from 1 to 6 and in tables by name.
+            #[serde(with = "stage_column")]
+            pub stage: u8,
+            /// Sleeve level: 0 at the outermost wall.
+            pub level: u8,
+            $(
+                $(#[$about])* pub $code: Option<u16>,
+                $(
+                    /// What is wrong with its frame: 0 nothing, 1 the sensor's error flag is set,
+                    /// 2 the parity is odd, 3 both.
+                    pub $error: u8,
+                )?
+                /// When it was taken, ticks; none before the first.
+                pub $at: Option<u32>,
+            )*
+            /// Code of the drive's bridge, 12 bits, 2048 without voltage; none if none was taken.
+            pub drive_code: Option<u16>,
+            /// Code of the pre-tightener's bridge.
+            pub pretightener_code: Option<u16>,
+            /// Number of the command that was given, from 1; 0 for none.
+            pub command: u8,
+            /// All other inputs and outputs of the tick as bits of `Flags`.
+            pub flags: u16,
+            $($(#[$doc])* pub $column: $cell,)*
+            /// Duty of the drive, -1 to 1.
+            pub drive_duty: f64,
+            /// Duty of the pre-tightener, -1 to 1.
+            pub pretightener_duty: f64,
+            /// The drive's bridge is on.
+            #[serde(with = "bit")]
+            pub drive_on: bool,
+            /// The pre-tightener's bridge is on.
+            #[serde(with = "bit")]
+            pub pretightener_on: bool,
+        }
+
+        impl Controller {
+            /// The quantities, in the order of their columns.
+            pub const QUANTITIES: &[Column] = &[$(Column {
+                name: stringify!($column),
+                stage: $stage,
+                curve: [$(Some(($plot, $curve)),)? None][0],
+                of: |row| row.$column.quantity().map_or(f64::NAN, Q16::to_num),
+            }),*];
+
+            /// A tick that did not run, or is not in the log.
+            pub fn unknown(tick: u32) -> Self {
+                Self {
+                    tick,
+                    t_s: f64::from(tick) * 1e-3,
+                    mode: OFF,
+                    $($column: Cell::UNKNOWN,)*
+                    drive_duty: f64::NAN,
+                    pretightener_duty: f64::NAN,
+                    ..Self::of(&Record::default(), &SensorFrame::default())
+                }
+            }
+
+            /// The columns of a record and of the codes that the tick used.
+            pub fn of(record: &Record, sensors: &SensorFrame) -> Self {
+                let Record { telemetry: seen, flags, .. } = record;
+                let (mode, retracts, fault) = split(seen.mode);
+                let arm = sensors.get(SensorId::ArmAngle, AngleFrame::new);
+                let code = |sensor| {
+                    let mask = if sensor == SensorId::ArmAngle { ANGLE } else { u16::MAX };
+                    sensors[sensor].map(|sample| sample.code & mask)
+                };
+                Self {
+                    tick: seen.at,
+                    t_s: f64::from(seen.at) * 1e-3,
+                    mode,
+                    retracts,
+                    fault,
+                    stage: seen.stage as u8,
+                    level: seen.level,
+                    $(
+                        $code: code(SensorId::$id),
+                        $($error: arm.map_or(0, |sample| angle_error(sample.code)),)?
+                        $at: sensors[SensorId::$id].map(|sample| sample.at),
+                    )*
+                    drive_code: sensors.bridges.map(|codes| codes.drive.get()),
+                    pretightener_code: sensors.bridges.map(|codes| codes.pretightener.get()),
+                    command: codes::of_command(flags.command()),
+                    flags: flags.to_bits(),
+                    $($column: Cell::of(seen.$field),)*
+                    drive_duty: f64::from(seen.drive.to_bits()) / DUTY,
+                    pretightener_duty: f64::from(seen.pretightener.to_bits()) / DUTY,
+                    drive_on: flags.has(Flags::DRIVE),
+                    pretightener_on: flags.has(Flags::PRELOAD),
+                }
+            }
+
+            /// The controller's sensor codes.
+            pub fn sensors(&self) -> SensorFrame {
+                let bridges = self.drive_code.zip(self.pretightener_code);
+                let mut frame = SensorFrame::default();
+                $(
+                    let taken = self.$code.zip(self.$at);
+                    frame[SensorId::$id] = taken.map(|(code, at)| Sample {
+                        code: [$(angle_frame(code, self.$error).get(),)? code][0],
+                        at,
+                    });
+                )*
+                frame.bridges = bridges.map(|(drive, pretightener)| BridgeCodes {
+                    drive: BridgeCode::new(drive),
+                    pretightener: BridgeCode::new(pretightener),
+                });
+                frame
+            }
+
+            /// The controller's state in its own numbers, where the log lacks a quantity that of
+            /// `absent`; none if mode or contact stage is invalid.
+            pub fn telemetry_over(&self, absent: &Telemetry) -> Option<Telemetry> {
+                let duty = |value: f64| Duty::from_bits((value * DUTY).round() as i16);
+                Some(Telemetry {
+                    at: self.tick,
+                    mode: self.mode()?,
+                    stage: codes::stage(self.stage)?,
+                    level: self.level,
+                    $($field: self.$column.quantity().unwrap_or(absent.$field),)*
+                    drive: duty(self.drive_duty),
+                    pretightener: duty(self.pretightener_duty),
+                })
+            }
+        }
+    };
+}
+interstage::sensors!(with_quantities);
 
 impl Default for Controller {
     fn default() -> Self {
@@ -199,102 +277,7 @@ impl Default for Controller {
     }
 }
 
-/// One in the format of a duty.
-const DUTY: f64 = 32_768.0;
-
 impl Controller {
-    /// A tick that did not run, or is not in the log.
-    pub fn unknown(tick: u32) -> Self {
-        Self {
-            tick,
-            t_s: f64::from(tick) * 1e-3,
-            mode: OFF,
-            position_mm: f64::NAN,
-            wheel_speed_mm_s: f64::NAN,
-            speed_ref_mm_s: f64::NAN,
-            preload_n: f64::NAN,
-            preload_ref_n: f64::NAN,
-            compression_mm: f64::NAN,
-            radius_mm: f64::NAN,
-            gap_predicted_mm: f64::NAN,
-            slip_margin: f64::NAN,
-            vibration_mm: f64::NAN,
-            distance_mm: None,
-            drive_duty: f64::NAN,
-            pretightener_duty: f64::NAN,
-            ..Tick::example(false).controller
-        }
-    }
-
-    /// The columns of a record and of the codes that the tick used.
-    pub fn of(record: &Record, sensors: &SensorFrame) -> Self {
-        let Record { telemetry: seen, flags, .. } = record;
-        let SensorFrame { wheel_encoder, preload_sensor, compression_sensor, arm_angle, bridges } =
-            sensors;
-        let (mode, retracts, fault) = split(seen.mode);
-        Self {
-            tick: seen.at,
-            t_s: f64::from(seen.at) * 1e-3,
-            mode,
-            retracts,
-            fault,
-            stage: seen.stage as u8,
-            level: seen.level,
-            wheel_encoder_code: wheel_encoder.map(|sample| sample.code.get()),
-            wheel_encoder_at: wheel_encoder.map(|sample| sample.at),
-            preload_code: preload_sensor.map(|sample| sample.code.get()),
-            preload_at: preload_sensor.map(|sample| sample.at),
-            compression_code: compression_sensor.map(|sample| sample.code.get()),
-            compression_at: compression_sensor.map(|sample| sample.at),
-            arm_angle_code: arm_angle.map(|sample| sample.code.get() & ANGLE),
-            arm_angle_error: arm_angle.map_or(0, |sample| angle_error(sample.code)),
-            arm_angle_at: arm_angle.map(|sample| sample.at),
-            drive_code: bridges.map(|codes| codes.drive.get()),
-            pretightener_code: bridges.map(|codes| codes.pretightener.get()),
-            command: codes::of_command(flags.command()),
-            flags: flags.to_bits(),
-            position_mm: seen.position.to_num(),
-            wheel_speed_mm_s: seen.speed.to_num(),
-            speed_ref_mm_s: seen.speed_ref.to_num(),
-            preload_n: seen.preload.to_num(),
-            preload_ref_n: seen.preload_ref.to_num(),
-            compression_mm: seen.compression.to_num(),
-            radius_mm: seen.radius.to_num(),
-            gap_predicted_mm: seen.gap_predicted.to_num(),
-            slip_margin: seen.slip_margin.to_num(),
-            vibration_mm: seen.vibration.to_num(),
-            distance_mm: (seen.distance != NO_FACE).then(|| seen.distance.to_num()),
-            drive_duty: f64::from(seen.drive.to_bits()) / DUTY,
-            pretightener_duty: f64::from(seen.pretightener.to_bits()) / DUTY,
-            drive_on: flags.has(Flags::DRIVE),
-            pretightener_on: flags.has(Flags::PRELOAD),
-        }
-    }
-
-    /// The controller's sensor codes.
-    pub fn sensors(&self) -> SensorFrame {
-        fn sample<T>(
-            code: Option<u16>,
-            at: Option<u32>,
-            make: impl Fn(u16) -> T,
-        ) -> Option<Sample<T>> {
-            Some(Sample { code: make(code?), at: at? })
-        }
-        let bridges = self.drive_code.zip(self.pretightener_code);
-        let wheel = (self.wheel_encoder_code, self.wheel_encoder_at);
-        let arm = |code| angle_frame(code, self.arm_angle_error);
-        SensorFrame {
-            wheel_encoder: sample(wheel.0, wheel.1, EncoderCount::new),
-            preload_sensor: sample(self.preload_code, self.preload_at, AdcCode::new),
-            compression_sensor: sample(self.compression_code, self.compression_at, AdcCode::new),
-            arm_angle: sample(self.arm_angle_code, self.arm_angle_at, arm),
-            bridges: bridges.map(|(drive, pretightener)| BridgeCodes {
-                drive: BridgeCode::new(drive),
-                pretightener: BridgeCode::new(pretightener),
-            }),
-        }
-    }
-
     /// All other inputs and outputs of the tick.
     pub const fn flags(&self) -> Flags {
         Flags::from_bits(self.flags)
@@ -312,29 +295,9 @@ impl Controller {
         codes::mode(code).filter(|mode| split(*mode).0 == self.mode)
     }
 
-    /// The controller's state in its own numbers; none if one of them is invalid.
+    /// The controller's state in its own numbers.
     pub fn telemetry(&self) -> Option<Telemetry> {
-        let q = |value: f64| (!value.is_nan()).then(|| Q16::from_num(value));
-        let duty = |value: f64| Duty::from_bits((value * DUTY).round() as i16);
-        Some(Telemetry {
-            at: self.tick,
-            mode: self.mode()?,
-            stage: codes::stage(self.stage)?,
-            position: q(self.position_mm)?,
-            speed: q(self.wheel_speed_mm_s)?,
-            speed_ref: q(self.speed_ref_mm_s)?,
-            preload: q(self.preload_n)?,
-            preload_ref: q(self.preload_ref_n)?,
-            compression: q(self.compression_mm)?,
-            radius: q(self.radius_mm)?,
-            level: self.level,
-            gap_predicted: q(self.gap_predicted_mm)?,
-            slip_margin: q(self.slip_margin)?,
-            vibration: q(self.vibration_mm)?,
-            distance: self.distance_mm.map_or(NO_FACE, Q16::from_num),
-            drive: duty(self.drive_duty),
-            pretightener: duty(self.pretightener_duty),
-        })
+        self.telemetry_over(&Telemetry::default())
     }
 }
 

@@ -5,7 +5,7 @@ use super::palette::{self, Colour};
 use super::panel::Look::{Limit, Measured, Truth, Wanted};
 use super::panel::{Line, Look, Marks, Panel, Rule, Shape, sheet};
 use super::verdict::GAP_TOLERANCE;
-use crate::record::{CrossingLine, Recording, Report, Tick};
+use crate::record::{Column, Controller, CrossingLine, Recording, Report, Tick, TrueState};
 use crate::scenario::Scenario;
 
 /// What the horizontal axis shows.
@@ -133,6 +133,19 @@ impl<'a> View<'a> {
         fields.map(|(name, look, of)| self.line(name, look, of)).into()
     }
 
+    /// The controller's curves of a plot, references first, and what is true.
+    fn curves(&self, plot: &str, colour: Colour, truth: fn(&TrueState) -> f64) -> Vec<Line> {
+        let of_plot = |column: &Column| {
+            let (_, name) = column.curve.filter(|curve| curve.0 == plot)?;
+            let look = if name == "reference" { Wanted } else { Measured(colour) };
+            Some(self.line(name, look, |row| (column.of)(&row.controller)))
+        };
+        let mut lines: Vec<Line> = Controller::QUANTITIES.iter().filter_map(of_plot).collect();
+        lines.sort_by_key(|line| line.look != Wanted);
+        lines.push(self.line("true", Truth, |row| row.of_truth(truth)));
+        lines
+    }
+
     /// Marks at lift-off of the crossings that have the value.
     fn marks(
         &self,
@@ -165,20 +178,12 @@ impl<'a> View<'a> {
     }
 
     pub(super) fn speed(&self) -> Panel {
-        let lines = self.lines([
-            ("reference", Wanted, |row| row.controller.speed_ref_mm_s),
-            ("estimated", Measured(palette::SPEED), |row| row.controller.wheel_speed_mm_s),
-            ("true", Truth, |row| row.of_truth(|t| t.speed_true_mm_s)),
-        ]);
+        let lines = self.curves("speed", palette::SPEED, |t| t.speed_true_mm_s);
         Panel { least_span: 2.0, lines, ..self.panel("Speed", "speed, mm/s") }
     }
 
     pub(super) fn preload(&self) -> Panel {
-        let lines = self.lines([
-            ("reference", Wanted, |row| row.controller.preload_ref_n),
-            ("measured", Measured(palette::PRELOAD), |row| row.controller.preload_n),
-            ("true", Truth, |row| row.of_truth(|t| t.preload_true_n)),
-        ]);
+        let lines = self.curves("preload", palette::PRELOAD, |t| t.preload_true_n);
         let levels = self.limit.into_iter().collect();
         Panel { least_span: 4.0, lines, levels, ..self.panel("Preload", "preload, N") }
     }
@@ -218,30 +223,21 @@ impl<'a> View<'a> {
     }
 
     pub(super) fn radius(&self) -> Panel {
-        let lines = self.lines([
-            ("from the arm angle", Measured(palette::RADIUS), |row| row.controller.radius_mm),
-            ("true", Truth, |row| row.of_truth(|t| t.radius_true_mm)),
-        ]);
+        let lines = self.curves("radius", palette::RADIUS, |t| t.radius_true_mm);
         Panel { lines, ..self.panel("Radial position of the wheel centre", "radius, mm") }
     }
 
     pub(super) fn slip_margin(&self) -> Panel {
         let mut panel = self.panel("Slip margin", "friction left, µ - used");
         panel.least_span = 0.2;
-        panel.lines = self.lines([
-            ("planned", Measured(palette::SLIP), |row| row.controller.slip_margin),
-            ("true", Truth, |row| row.of_truth(|t| t.slip_margin_true)),
-        ]);
+        panel.lines = self.curves("slip margin", palette::SLIP, |t| t.slip_margin_true);
         panel.levels = vec![("slip", Limit, 0.0)];
         panel.reach = vec![-0.1];
         panel
     }
 
     pub(super) fn compression(&self) -> Panel {
-        let lines = self.lines([
-            ("measured", Measured(palette::COMPRESSION), |row| row.controller.compression_mm),
-            ("true", Truth, |row| row.of_truth(|t| t.compression_true_mm)),
-        ]);
+        let lines = self.curves("compression", palette::COMPRESSION, |t| t.compression_true_mm);
         Panel { least_span: 0.1, lines, ..self.panel("Tread compression", "compression, mm") }
     }
 

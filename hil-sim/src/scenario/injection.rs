@@ -5,6 +5,7 @@ mod catalogue;
 use serde::{Deserialize, Serialize};
 
 pub use catalogue::{CATALOGUE, Entry, HARDWARE, entry};
+use interstage::sense::raw::SensorId;
 
 use crate::table::label;
 
@@ -97,11 +98,6 @@ impl Injection {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Target {
-    Encoder,
-    PreloadSensor,
-    CompressionSensor,
-    /// Arm angle sensor.
-    Angle,
     /// Converter that reads the outputs of both bridges.
     Readback,
     DriveReadback,
@@ -161,6 +157,8 @@ pub enum Target {
     Magnet,
     StopWire,
     OptionBytes,
+    #[serde(untagged)]
+    Sensor(SensorId),
 }
 
 /// How it breaks.
@@ -220,15 +218,10 @@ impl Target {
         word(self)
     }
 
-    /// Whether it is one of the four sensors or the readback of a bridge.
+    /// Whether it is a sensor, or the readback of a bridge or of both.
     pub(crate) const fn is_sensor(self) -> bool {
-        use Target::{Angle, CompressionSensor, Encoder, PreloadSensor};
-        self.is_readback() || matches!(self, Encoder | PreloadSensor | CompressionSensor | Angle)
-    }
-
-    /// Whether it is the readback of a bridge or of both.
-    pub(crate) const fn is_readback(self) -> bool {
-        matches!(self, Self::Readback | Self::DriveReadback | Self::PretightenerReadback)
+        use Target::{DriveReadback, PretightenerReadback, Readback, Sensor};
+        matches!(self, Sensor(_) | Readback | DriveReadback | PretightenerReadback)
     }
 
     /// Whether such a fault of it resets the board, at once or by the watchdog.

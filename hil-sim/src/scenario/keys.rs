@@ -7,8 +7,9 @@ use toml::{Table, Value};
 
 use super::run::{ControllerKind, Direction, MismatchDraw, RunOptions};
 use crate::plant::mismatch::Mismatch;
+use crate::plant::sensors::Noise;
+use crate::plant::spread::Spread;
 use crate::plant::spread::{Field, Section};
-use crate::plant::spread::{Noise, Spread};
 
 /// Names of the presets.
 pub const PRESETS: [&str; 2] = ["prototype", "fe"];

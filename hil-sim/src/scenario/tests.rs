@@ -1,5 +1,7 @@
 use std::path::Path;
 
+use interstage::sense::raw::SensorId;
+
 use super::injection::{Injection, Kind, Target};
 use super::*;
 
@@ -246,7 +248,7 @@ fn faults_are_read_and_written_back() {
     let parse = |text: &str| Scenario::parse("bench.toml", text, &[]).unwrap();
     let scenario = parse(text);
     let [first, second] = scenario.run.faults.as_slice() else { panic!("two") };
-    let gain = Injection::at(Target::PreloadSensor, Kind::Gain, 0.0, 1.1);
+    let gain = Injection::at(Target::Sensor(SensorId::PreloadSensor), Kind::Gain, 0.0, 1.1);
     assert_eq!(*first, Injection { at_s: None, at_mm: Some(20.0), ..gain });
     assert_eq!((second.at_crossing, second.duration_s), (Some(2), Some(0.5)));
     assert_eq!(second.magnitude(), 1.0, "as the catalogue has it");

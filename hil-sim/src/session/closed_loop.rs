@@ -4,7 +4,7 @@
 use interstage::log::{Record, SnapshotRecorder};
 use interstage::model::{Plan, Planner};
 use interstage::restart::{DriveSnapshot, MissedCheckIns, Reset, Restart};
-use interstage::sense::raw::{Sample, SensorFrame};
+use interstage::sense::raw::SensorFrame;
 use interstage::supervise::{Command, Mode};
 use interstage::tick::{Controller, Input, Output, State};
 use interstage::units::{Millimetres, MotorCommand, Tick};
@@ -14,12 +14,9 @@ use super::{Options, RunError, RunningRig};
 use crate::injector::{FaultInjector, FaultTimes, RecordFound};
 use crate::plant::limits::Refusal;
 use crate::plant::rig::{Drives, VirtualRig};
-use crate::plant::sensors::{Codes, Sensed, Sensors};
+use crate::plant::sensors::{Codes, Sensors};
 use crate::record::{Controller as Columns, Recording, RunRecorder};
 use crate::scenario::{Direction, Scenario, TICK_S};
-
-/// The angle sensor is read every second tick.
-const ANGLE_EVERY: Tick = 2;
 
 /// A run in progress.
 ///
@@ -116,13 +113,7 @@ impl Session {
     pub fn sense(&mut self) -> SensorFrame {
         let codes = read(&mut self.sensors, &self.plant);
         let at = self.tick;
-        self.frame.wheel_encoder = Some(Sample { code: codes.wheel_encoder, at });
-        self.frame.preload_sensor = Some(Sample { code: codes.preload_sensor, at });
-        self.frame.compression_sensor = Some(Sample { code: codes.compression_sensor, at });
-        self.frame.bridges = Some(codes.bridges);
-        if at.is_multiple_of(ANGLE_EVERY) {
-            self.frame.arm_angle = Some(Sample { code: codes.arm_angle, at });
-        }
+        codes.put(&mut self.frame, at);
         let mut frame = self.frame;
         if let Some(injector) = &mut self.injector {
             injector.begin(f64::from(at) * TICK_S, self.plant.truth());
@@ -295,15 +286,7 @@ pub fn initial_rig(scenario: &Scenario) -> Result<(VirtualRig, Sensors), Refusal
 
 /// What the sensors of this plant read now, a tick after the last call.
 pub fn read(sensors: &mut Sensors, plant: &VirtualRig) -> Codes {
-    let truth = plant.truth();
-    let sensed = Sensed {
-        rotation_rad: truth.rotation_rad,
-        preload_n: truth.preload_n,
-        depth_mm: truth.compression_mm,
-        arm_rad: truth.arm_rad,
-        bridges: truth.bridges,
-    };
-    sensors.read(sensed, TICK_S)
+    sensors.read(plant.truth(), TICK_S)
 }
 
 /// Bridge commands as the plant sees them.

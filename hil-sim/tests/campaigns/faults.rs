@@ -5,6 +5,7 @@ use hil_sim::faults::campaign::{Case, FaultCampaign, MatrixRow, Outcome, twin, w
 use hil_sim::scenario::Scenario;
 use hil_sim::scenario::injection::{Injection, Kind, Target};
 use hil_sim::session::{Options, run};
+use interstage::sense::raw::SensorId;
 
 fn campaign_on(scenario: Scenario, instants: usize, wanted: impl Fn(&str) -> bool) -> Outcome {
     let cases = Case::all().into_iter().filter(|case| wanted(&case.name())).collect();
@@ -73,14 +74,14 @@ fn a_campaign_is_the_same_on_any_number_of_processors() {
 #[test]
 fn a_run_with_a_fault_of_its_scenario_ends_in_it_and_reports_it() {
     let mut scenario = Scenario::default();
-    let stuck = Injection::at(Target::PreloadSensor, Kind::Stuck, 0.0, 0.0);
+    let stuck = Injection::at(Target::Sensor(SensorId::PreloadSensor), Kind::Stuck, 0.0, 0.0);
     scenario.run.faults = vec![Injection { at_s: None, at_mm: Some(10.0), ..stuck }];
     let recording = run(&scenario, Options::ROWS).expect("a run");
     let summary = recording.summary;
     assert_eq!(summary.faults.iter().map(|fault| fault.code).collect::<Vec<_>>(), [116]);
     assert!(!summary.completed && (10.0..14.0).contains(&summary.travel_mm), "{summary:?}");
     assert_eq!(summary.injected, ["preload-sensor stuck from 10 mm"]);
-    let off = Injection::at(Target::Encoder, Kind::Off, 2.5, 0.0);
+    let off = Injection::at(Target::Sensor(SensorId::WheelEncoder), Kind::Off, 2.5, 0.0);
     assert_eq!(off.words(Some(0.357)), "encoder off from 2.143 s (2.5 s from boot)");
     assert_eq!(off.words(None), "encoder off from 2.5 s");
 }
@@ -91,7 +92,12 @@ fn an_encoder_that_counts_too_few_is_not_taken_for_a_load() {
     for (seed, at_s) in [(32, 1.211), (35, 1.147)] {
         let mut scenario = Scenario::default();
         scenario.run.seed = seed;
-        scenario.run.faults = vec![Injection::at(Target::Encoder, Kind::Gain, at_s, 2.0 / 3.0)];
+        scenario.run.faults = vec![Injection::at(
+            Target::Sensor(SensorId::WheelEncoder),
+            Kind::Gain,
+            at_s,
+            2.0 / 3.0,
+        )];
         let summary = run(&scenario, Options::default()).expect("a run").summary;
         let fault = summary.faults.first().expect("a fault");
         assert!(fault.code == 125 && fault.t_s < at_s + 1.0, "{fault:?}");
@@ -109,7 +115,8 @@ fn the_whole_top_load_on_one_wheel_is_a_load() {
 fn a_compression_sensor_that_is_far_off_from_before_boot_is_reported() {
     let reported = |preset: &str, gain: f64| {
         let mut scenario = Scenario::named(preset).expect("a preset");
-        scenario.run.faults = vec![Injection::at(Target::CompressionSensor, Kind::Gain, 0.0, gain)];
+        scenario.run.faults =
+            vec![Injection::at(Target::Sensor(SensorId::CompressionSensor), Kind::Gain, 0.0, gain)];
         let summary = run(&scenario, Options::default()).expect("a run").summary;
         // At rest, by the gap of the first crossing, or by steps that are not in their places.
         let limited = summary.limits.iter().any(|limit| matches!(limit.code, 211 | 212));

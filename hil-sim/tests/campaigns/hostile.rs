@@ -9,9 +9,7 @@ use crate::common::echo::Echo;
 use interstage::model::history::History;
 use interstage::model::{Learned, Plan, PlanRequest, Planner, Review};
 use interstage::rig::Rig;
-use interstage::sense::raw::{
-    AdcCode, AngleFrame, BridgeCode, BridgeCodes, EncoderCount, Sample, SensorFrame,
-};
+use interstage::sense::raw::{BridgeCode, BridgeCodes, SensorFrame, SensorId};
 use interstage::supervise::{Command, Mode};
 use interstage::tick::{Controller, Input, Output, State};
 use interstage::units::{Direction, Q16, Tick};
@@ -145,11 +143,8 @@ fn frame(
     random: &mut ChaCha8Rng,
 ) -> SensorFrame {
     let made = |wheel: u16, load: u16, tread: u16, arm: u16| SensorFrame {
-        wheel_encoder: Some(Sample { code: EncoderCount::new(wheel), at: now }),
-        preload_sensor: Some(Sample { code: AdcCode::new(load), at: now }),
-        compression_sensor: Some(Sample { code: AdcCode::new(tread), at: now }),
-        arm_angle: Some(Sample { code: AngleFrame::new(arm), at: now }),
         bridges,
+        ..SensorFrame::taken(now, [wheel, load, tread, arm])
     };
     let even = |angle: u16| angle & 0x3FFF | parity(angle & 0x3FFF);
     match feed {
@@ -172,14 +167,14 @@ fn frame(
                 2 => *at = now.wrapping_add(random.random_range(0..2000)),
                 _ => {}
             };
-            if let Some(sample) = &mut frame.wheel_encoder {
+            if let Some(sample) = &mut frame[SensorId::WheelEncoder] {
                 time(&mut sample.at, random);
             }
-            if let Some(sample) = &mut frame.arm_angle {
+            if let Some(sample) = &mut frame[SensorId::ArmAngle] {
                 time(&mut sample.at, random);
             }
             if random.random_range(0..20) == 0 {
-                frame.preload_sensor = None;
+                frame[SensorId::PreloadSensor] = None;
             }
             frame
         }

@@ -8,9 +8,7 @@ use interstage::estimate::vibration::{VibrationObserver, VibrationState};
 use interstage::model::profile::{Profile, ProfileState};
 use interstage::numeric::{LowPass, LowPassState};
 use interstage::rig::Rig;
-use interstage::sense::raw::{
-    AdcCode, AngleFrame, BridgeCode, BridgeCodes, EncoderCount, Sample, SensorFrame,
-};
+use interstage::sense::raw::{BridgeCode, BridgeCodes, SensorFrame};
 use interstage::sense::{Senses, SensesState};
 use interstage::tick::{Controller, Input, State};
 use interstage::units::Q16;
@@ -112,11 +110,8 @@ fn loops(rig: &Rig) {
 
 fn sensed(rig: &Rig) {
     let frame = |at, code: (u16, u16, u16, u16)| SensorFrame {
-        wheel_encoder: Some(Sample { code: EncoderCount::new(code.0), at }),
-        preload_sensor: Some(Sample { code: AdcCode::new(code.1), at }),
-        compression_sensor: Some(Sample { code: AdcCode::new(code.2), at }),
-        arm_angle: Some(Sample { code: AngleFrame::new(code.3 | parity(code.3)), at }),
         bridges: Some(BridgeCodes { drive: BridgeCode::of(0), pretightener: BridgeCode::of(0) }),
+        ..SensorFrame::taken(at, [code.0, code.1, code.2, code.3 | parity(code.3)])
     };
     let senses = Senses::try_build(rig).expect("a preset");
     // Rolling and loaded, then everything rests.

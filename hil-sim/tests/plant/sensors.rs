@@ -1,11 +1,10 @@
 //! The emulated sensors through the firmware's own conversion.
 
-use hil_sim::plant::draw::SensorParameters;
-use hil_sim::plant::sensors::{Codes, Sensed, Sensors};
-use hil_sim::plant::spread::Noise;
+use hil_sim::plant::rig::Truth;
+use hil_sim::plant::sensors::{Codes, Noise, SensorParameters, Sensors};
 use hil_sim::scenario::Scenario;
 use interstage::rig::Rig;
-use interstage::sense::raw::{Sample, SensorFrame};
+use interstage::sense::raw::{SensorFrame, SensorId};
 use interstage::sense::{SensedState, Senses, SensesState, Tuning, Validity};
 use interstage::units::MillimetresPerSecond2;
 
@@ -36,20 +35,15 @@ impl Chain {
         }
     }
 
-    fn read(&mut self, sensed: Sensed) -> Codes {
-        self.plant.read(sensed, TICK_S)
+    fn read(&mut self, sensed: Truth) -> Codes {
+        self.plant.read(&sensed, TICK_S)
     }
 
-    fn sense(&mut self, sensed: Sensed) -> SensedState {
+    fn sense(&mut self, sensed: Truth) -> SensedState {
         let codes = self.read(sensed);
         let at = self.now;
-        let frame = SensorFrame {
-            wheel_encoder: Some(Sample { code: codes.wheel_encoder, at }),
-            preload_sensor: Some(Sample { code: codes.preload_sensor, at }),
-            compression_sensor: Some(Sample { code: codes.compression_sensor, at }),
-            arm_angle: Some(Sample { code: codes.arm_angle, at }),
-            bridges: Some(codes.bridges),
-        };
+        let frame =
+            SensorFrame { bridges: Some(codes.bridges), ..SensorFrame::taken(at, codes.sensors) };
         self.now += 1;
         let rest = MillimetresPerSecond2::from_num(0);
         self.firmware.step(&mut self.state, at, &frame, rest)
@@ -70,12 +64,12 @@ fn every_quantity_comes_back_within_its_quantisation() {
         let (preload, depth, radius) = (190.0 * part, 4.8 * part, 112.0 + 14.0 * part);
         // Forwards and back again, slowly enough for a wheel.
         let travel = 60.0 * (part * 6.0).sin();
-        let seen = chain.sense(Sensed {
+        let seen = chain.sense(Truth {
             rotation_rad: travel / 25.0,
             preload_n: preload,
-            depth_mm: depth,
+            compression_mm: depth,
             arm_rad: arm_rad(radius),
-            ..Sensed::default()
+            ..Truth::default()
         });
         assert_eq!(seen.preload.validity, Validity::Valid);
         assert_eq!(seen.compression.validity, Validity::Valid);
@@ -111,12 +105,12 @@ fn a_reading_is_as_old_as_its_delay() {
         for i in 0..200 {
             // Ramps of 0.5 N, 0.01 mm and 0.05 mm a millisecond.
             let at = f64::from(i);
-            let seen = chain.sense(Sensed {
+            let seen = chain.sense(Truth {
                 rotation_rad: 0.0,
                 preload_n: 0.5 * at,
-                depth_mm: 0.01 * at,
+                compression_mm: 0.01 * at,
                 arm_rad: arm_rad(125.0 - 0.05 * at),
-                ..Sensed::default()
+                ..Truth::default()
             });
             // Before there was anything older, the oldest.
             let then = (at - ticks).max(0.0);
@@ -140,12 +134,12 @@ fn noise_has_its_deviation_and_no_bias() {
     let (count, radius) = (5000, 120.0);
     let mut sums = [(0.0, 0.0); 3];
     for _ in 0..count {
-        let seen = chain.sense(Sensed {
+        let seen = chain.sense(Truth {
             rotation_rad: 0.0,
             preload_n: 40.0,
-            depth_mm: 0.8,
+            compression_mm: 0.8,
             arm_rad: arm_rad(radius),
-            ..Sensed::default()
+            ..Truth::default()
         });
         let off = [
             seen.preload.value.to_num::<f64>() - 40.0,
@@ -170,8 +164,8 @@ fn noise_has_its_deviation_and_no_bias() {
 fn codes_stop_at_the_converters_ends() {
     let mut chain = Chain::new(Noise::default());
     let mut codes = |preload_n| {
-        let codes = chain.read(Sensed { preload_n, ..Sensed::default() });
-        codes.preload_sensor.get()
+        let codes = chain.read(Truth { preload_n, ..Truth::default() });
+        codes.sensors[SensorId::PreloadSensor as usize]
     };
     assert_eq!((codes(1e6), codes(-1e6)), (u16::MAX, 0));
 }
@@ -187,7 +181,7 @@ fn a_bridge_reads_its_output_behind_a_low_pass_within_what_the_controller_allows
         let mut lags = [Lag::default(); 2];
         for tick in 0..400 {
             let output = [[0.0, 1.0], [0.9, -0.3], [-1.0, 0.0]][tick / 40 % 3];
-            let codes = sensors.read(Sensed { bridges: output, ..Sensed::default() }, 1e-3).bridges;
+            let codes = sensors.read(&Truth { bridges: output, ..Truth::default() }, 1e-3).bridges;
             for (i, code) in [codes.drive, codes.pretightener].into_iter().enumerate() {
                 let expected = lags[i].step((output[i] * 32_768.0) as i32);
                 let settled = tick % 40 > 4;

@@ -57,7 +57,7 @@ fn recorded_runs_give_the_same_bits() {
 }
 
 /// A kept log, which is never written again: while the layout has its number, every frame of it is
-/// read.
+/// read. A change of what is in a frame changes `LAYOUT` in `src/log/identity.rs`.
 #[test]
 fn a_kept_log_is_read_whole_as_long_as_the_layout_has_its_number() {
     let run = Run::read(&data("released/layout-7.mcap")).expect("a log");

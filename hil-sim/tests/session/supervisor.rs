@@ -10,9 +10,7 @@ use hil_sim::scenario::Scenario;
 use hil_sim::session::{drives, read};
 use interstage::fault::Fault;
 use interstage::model::{Plan, Planner};
-use interstage::sense::raw::{
-    AdcCode, AngleFrame, BridgeCode, BridgeCodes, EncoderCount, Sample, SensorFrame,
-};
+use interstage::sense::raw::{BridgeCode, BridgeCodes, Sample, SensorFrame, SensorId};
 use interstage::supervise::{Command, Mode, ServiceDuties};
 use interstage::tick::{Controller, Event, Input, Output, State};
 use interstage::units::{Direction, Duty, MotorCommand};
@@ -48,13 +46,7 @@ fn snapshots() -> Vec<(Mode, Snapshot)> {
         let (mut plan, mut within) = (None, 0);
         for now in 0..30_000 {
             let codes = read(&mut sensors, &plant);
-            frame.wheel_encoder = Some(Sample { code: codes.wheel_encoder, at: now });
-            frame.preload_sensor = Some(Sample { code: codes.preload_sensor, at: now });
-            frame.compression_sensor = Some(Sample { code: codes.compression_sensor, at: now });
-            frame.bridges = Some(codes.bridges);
-            if now % 2 == 0 {
-                frame.arm_angle = Some(Sample { code: codes.arm_angle, at: now });
-            }
+            codes.put(&mut frame, now);
             let before = state.mode();
             let command = match before {
                 Mode::Idle if within > 20 && !serves => Some(Command::Start),
@@ -139,40 +131,33 @@ const SPOILS: [Spoil; 12] = [
     (Fault::PretightenerBridge, |input| {
         spoil(input, |codes| codes.pretightener = BridgeCode::of(-29_000));
     }),
-    (Fault::PreloadSensorRange, |input| set(&mut input.sensors.preload_sensor, AdcCode::new(0))),
-    (Fault::CompressionSensorRange, |input| {
-        set(&mut input.sensors.compression_sensor, AdcCode::new(0xffff))
-    }),
-    (Fault::ArmAngleRange, |input| set(&mut input.sensors.arm_angle, AngleFrame::new(2000))),
+    (Fault::PreloadSensorRange, |input| set(input, SensorId::PreloadSensor, 0)),
+    (Fault::CompressionSensorRange, |input| set(input, SensorId::CompressionSensor, 0xffff)),
+    (Fault::ArmAngleRange, |input| set(input, SensorId::ArmAngle, 2000)),
 ];
 
 fn spoil(input: &mut Input, of: fn(&mut BridgeCodes)) {
     input.sensors.bridges.iter_mut().for_each(of);
 }
 
-fn set<T>(sample: &mut Option<Sample<T>>, code: T) {
-    if let Some(sample) = sample {
-        sample.code = code;
-    }
+fn set(input: &mut Input, sensor: SensorId, code: u16) {
+    input.sensors[sensor].iter_mut().for_each(|sample| sample.code = code);
 }
 
 /// The next input: fresh readings as before, but for the sensor that falls silent.
 fn next(input: &Input, silent: Fault) -> Input {
     let mut input = Input { now: input.now + 1, command: None, plan: None, ..*input };
-    let now = input.now;
-    let frame = &mut input.sensors;
-    let fresh = |fault: Fault, at: &mut u32| {
-        if fault != silent {
-            *at = now;
+    let stale = [
+        Fault::WheelEncoderStale,
+        Fault::PreloadSensorStale,
+        Fault::CompressionSensorStale,
+        Fault::ArmAngleStale,
+    ];
+    for (sample, fault) in input.sensors.samples.iter_mut().zip(stale) {
+        if let Some(sample) = sample.as_mut().filter(|_| fault != silent) {
+            sample.at = input.now;
         }
-    };
-    frame.wheel_encoder.iter_mut().for_each(|s| fresh(Fault::WheelEncoderStale, &mut s.at));
-    frame.preload_sensor.iter_mut().for_each(|s| fresh(Fault::PreloadSensorStale, &mut s.at));
-    frame
-        .compression_sensor
-        .iter_mut()
-        .for_each(|s| fresh(Fault::CompressionSensorStale, &mut s.at));
-    frame.arm_angle.iter_mut().for_each(|s| fresh(Fault::ArmAngleStale, &mut s.at));
+    }
     input
 }
 
@@ -273,7 +258,7 @@ proptest! {
         let Snapshot { mut state, input, plan } =
             FROM.with(|all| all[from % all.len()].1.clone());
         let controller = controller();
-        let mut count = input.sensors.wheel_encoder.map_or(0, |wheel| wheel.code.get());
+        let mut count = input.sensors[SensorId::WheelEncoder].map_or(0, |wheel| wheel.code);
         let (mut echo, mut sound) = (Echo::default(), input.sensors.bridges.unwrap_or_default());
         for (now, tick) in (input.now + 1..).zip(ticks) {
             let before = state.mode();
@@ -281,19 +266,20 @@ proptest! {
                 tick;
             count = count.wrapping_add_signed(wheel.map_or(0, |(by, _)| by));
             let at = |age: u32| now.saturating_sub(age);
-            let adc = |(code, age)| Sample { code: AdcCode::new(code), at: at(age) };
-            let angle = |code: u16| {
-                AngleFrame::new(code & 0x3fff | ((code & 0x3fff).count_ones() as u16 & 1) << 15)
-            };
+            let angle =
+                |code: u16| code & 0x3fff | ((code & 0x3fff).count_ones() as u16 & 1) << 15;
+            let codes = [
+                wheel.map(|(_, age)| (count, age)),
+                preload,
+                compression,
+                arm.map(|(code, age)| (angle(code), age)),
+            ];
             let drive = bridges.map(|drive| drive.unwrap_or(sound.drive));
-            let sensors = SensorFrame {
-                wheel_encoder: wheel
-                    .map(|(_, age)| Sample { code: EncoderCount::new(count), at: at(age) }),
-                preload_sensor: preload.map(adc),
-                compression_sensor: compression.map(adc),
-                arm_angle: arm.map(|(code, age)| Sample { code: angle(code), at: at(age) }),
-                bridges: drive.map(|drive| BridgeCodes { drive, ..sound }),
-            };
+            let bridges = drive.map(|drive| BridgeCodes { drive, ..sound });
+            let mut sensors = SensorFrame { bridges, ..SensorFrame::default() };
+            for (sample, code) in sensors.samples.iter_mut().zip(codes) {
+                *sample = code.map(|(code, age)| Sample { code, at: at(age) });
+            }
             let input = Input {
                 now,
                 sensors,

@@ -28,7 +28,7 @@ use interstage::hal::{
 use interstage::log::{Identity, LogEncoder};
 use interstage::model::Planner;
 use interstage::restart::DriveSnapshot;
-use interstage::sense::raw::{AdcCode, AngleFrame, BridgeCodes, BusFault, EncoderCount};
+use interstage::sense::raw::{AdcCode, AngleFrame, BridgeCodes, BusFault, EncoderCount, SensorId};
 use interstage::supervise::{Command, Mode};
 use interstage::tasks::{self, Exchange, TickIo, TickIoCell};
 use interstage::tick::{Controller, CrossingRecord, Entry, Event, Telemetry};
@@ -66,23 +66,23 @@ impl Shared {
 struct Peripheral(Rc<Shared>);
 
 /// A converter, and its code.
-struct Converter(Rc<Shared>, fn(&Codes) -> AdcCode);
+struct Converter(Rc<Shared>, SensorId);
 
 impl WheelEncoder for Peripheral {
     fn count(&mut self) -> EncoderCount {
-        self.0.codes().wheel_encoder
+        EncoderCount::new(self.0.codes().sensors[SensorId::WheelEncoder as usize])
     }
 }
 
 impl AnalogInput for Converter {
     async fn sample(&mut self) -> Result<AdcCode, BusFault> {
-        Ok((self.1)(&self.0.codes()))
+        Ok(AdcCode::new(self.0.codes().sensors[self.1 as usize]))
     }
 }
 
 impl AngleBus for Peripheral {
     async fn frame(&mut self) -> Result<AngleFrame, BusFault> {
-        Ok(self.0.codes().arm_angle)
+        Ok(AngleFrame::new(self.0.codes().sensors[SensorId::ArmAngle as usize]))
     }
 }
 
@@ -199,16 +199,11 @@ impl Board {
         let planner = forever(Planner::try_build(&scenario.rig).expect("a sound rig"));
         let latest = forever(TickIoCell::new(TickIo::default()));
         let part = || Peripheral(Rc::clone(&self.shared));
-        let converter = |code| Converter(Rc::clone(&self.shared), code);
-        let preload = converter(|codes| codes.preload_sensor);
-        let compression = converter(|codes| codes.compression_sensor);
         let (wheel, arm, button) = (part(), part(), part());
         let (motors, watchdog, journal, light) = (part(), part(), part(), part());
         self.tasks = vec![
             Box::pin(async { tasks::clock(exchange).await }),
             Box::pin(async { tasks::wheel_encoder(wheel, exchange).await }),
-            Box::pin(async { tasks::preload_sensor(preload, exchange).await }),
-            Box::pin(async { tasks::compression_sensor(compression, exchange).await }),
             Box::pin(async { tasks::arm_angle(arm, exchange).await }),
             Box::pin(async { tasks::operator(button, exchange).await }),
             Box::pin(async { tasks::motors(motors, watchdog, controller, latest, exchange).await }),
@@ -219,8 +214,13 @@ impl Board {
                 tasks::journal(journal, light, &mut encoder, exchange).await
             }),
         ];
+        for sensor in SensorId::ANALOG {
+            let input = Converter(Rc::clone(&self.shared), sensor);
+            let task = Box::pin(async move { tasks::analog(sensor, input, exchange).await });
+            self.tasks.insert(1 + sensor as usize, task);
+        }
         if order == Order::TickFirst {
-            self.tasks[1..7].rotate_right(1);
+            self.tasks[1..SensorId::COUNT + 3].rotate_right(1);
         }
     }
 

@@ -2,9 +2,8 @@
 
 use embassy_stm32::gpio::{AnyPin, Level, Output, Speed};
 use embassy_stm32::{Peri, Peripherals};
-use interstage::hal::hil::Given;
 use interstage::hal::{AnalogInput, AngleBus, CommandSource, Motors, WheelEncoder};
-use interstage::sense::raw::{AdcCode, AngleFrame, BridgeCodes, BusFault, EncoderCount};
+use interstage::sense::raw::{AdcCode, AngleFrame, BridgeCodes, BusFault, EncoderCount, SensorId};
 use interstage::supervise::Command;
 use interstage::units::MotorCommand;
 use rtt_target::DownChannel;
@@ -21,15 +20,12 @@ impl WheelEncoder for Wheel {
     }
 }
 
-pub(crate) type PreloadSensor = Analog;
-pub(crate) type CompressionSensor = Analog;
-
-/// One of the two analogue sensors.
-pub(crate) struct Analog(fn(&Given) -> Option<u16>);
+/// A sensor of [`SensorId::ANALOG`].
+pub(crate) struct Analog(SensorId);
 
 impl AnalogInput for Analog {
     async fn sample(&mut self) -> Result<AdcCode, BusFault> {
-        (self.0)(&host_io::get().given).map(AdcCode::new).ok_or(BusFault::Timeout)
+        host_io::get().given.code(self.0).map(AdcCode::new).ok_or(BusFault::Timeout)
     }
 }
 
@@ -37,7 +33,8 @@ pub(crate) struct Angle;
 
 impl AngleBus for Angle {
     async fn frame(&mut self) -> Result<AngleFrame, BusFault> {
-        host_io::get().given.arm_angle.map(AngleFrame::new).ok_or(BusFault::Timeout)
+        let frame = host_io::get().given.code(SensorId::ArmAngle);
+        frame.map(AngleFrame::new).ok_or(BusFault::Timeout)
     }
 }
 
@@ -83,8 +80,7 @@ pub(crate) fn split(
     core::mem::forget(pins.map(|pin| Output::new(pin, Level::Low, Speed::Low)));
     let parts = Parts {
         wheel_encoder: Wheel,
-        preload_sensor: Analog(|given| given.preload_sensor),
-        compression_sensor: Analog(|given| given.compression_sensor),
+        analog: SensorId::ANALOG.map(Analog),
         arm_angle: Angle,
         motors: Bridges,
         watchdog: Guard::new(p.IWDG, p.TIM7),

@@ -1,5 +1,4 @@
-//! The two analogue sensors: one converter and one DMA channel each, so that
-//! neither waits for the other.
+//! An analogue sensor: one converter and one DMA channel each, so that none waits for another.
 //!
 //! Each converts continuously, and DMA writes its codes into a ring; a sample is the latest of
 //! them, by the channel's own count. Nothing is started or awaited, so that a sample needs no
@@ -17,7 +16,7 @@ use interstage::hal::AnalogInput;
 use interstage::sense::raw::{AdcCode, BusFault};
 use static_cell::StaticCell;
 
-use crate::board::Irqs;
+use super::Irqs;
 use crate::board::registers::{Adc as Registers, DmaChannel as Channel, Exten};
 
 /// `OVSR` for 256 conversions a code.
@@ -53,7 +52,7 @@ pub(crate) struct Analog {
 impl Analog {
     /// Calibrates the converter and starts converting `pin` through this DMA channel, both with
     /// their registers. Each ring serves once.
-    pub(crate) fn new<T: DefaultInstance, D: RxDma<T>>(
+    pub(super) fn new<T: DefaultInstance, D: RxDma<T>>(
         (adc, registers): (Peri<'static, T>, Registers),
         pin: impl AdcChannel<T> + 'static,
         (dma, channel): (Peri<'static, D>, Channel),

@@ -80,8 +80,8 @@ static BLOCKS: [Block; 26] = [
     Block::of(GPIOF, Some(ahb2enr::GPIOFEN), |chip| &mut chip.ports[5]),
     Block::of(GPIOG, Some(ahb2enr::GPIOGEN), |chip| &mut chip.ports[6]),
     // With the other converter of the pair, and the common registers.
-    Block::of(ADC1, Some(ahb2enr::ADC12EN), |chip| &mut chip.adc),
-    Block::of(ADC3, Some(ahb2enr::ADC345EN), |chip| &mut chip.readback),
+    Block::of(ADC1, Some(ahb2enr::ADC12EN), |chip| &mut chip.adcs[0]),
+    Block::of(ADC3, Some(ahb2enr::ADC345EN), |chip| &mut chip.adcs[1]),
     Block::of_core("DWT", 0xE000_1000, |chip| &mut chip.counter),
     Block::of_core("SCS", CORE, |chip| &mut chip.system),
     Block::of(DBGMCU, None, |chip| &mut chip.debug),

@@ -1,5 +1,7 @@
 //! The chip's pins as they are wired on the board (docs/HARDWARE.md): inputs and outputs.
 
+use interstage::sense::raw::SensorId;
+
 use super::Chip;
 use crate::peripherals::gpio::Role;
 use crate::peripherals::spi::Frame;
@@ -32,8 +34,11 @@ type Carried = (Pin, u32);
 const WHEEL: [Carried; 2] = [(Pin(0, 0), 2), (Pin(0, 1), 2)];
 /// Lines of the angle sensor at SPI1: clock, to the board, from the board.
 const ANGLE: [Carried; 3] = [(Pin(1, 3), 5), (Pin(0, 6), 5), (Pin(0, 7), 5)];
-/// Analogue inputs: pin and channel of ADC1 and of ADC2, then two of ADC3.
-const ANALOG: [(Pin, usize); 4] = [(Pin(2, 2), 8), (Pin(2, 3), 9), (Pin(1, 0), 12), (Pin(1, 1), 1)];
+/// Sensors at analogue inputs.
+const SENSORS: usize = SensorId::ANALOG.len();
+/// Analogue inputs of the sensors, then of the bridges: pin, converter (0 is ADC1) and its channel.
+pub(super) const ANALOG: [(Pin, usize, usize); SENSORS + 2] =
+    [(Pin(2, 2), 0, 8), (Pin(2, 3), 1, 9), (Pin(1, 0), 2, 12), (Pin(1, 1), 2, 1)];
 
 /// Wiring of a motor's bridge.
 struct Wired {
@@ -183,24 +188,22 @@ impl Chip {
         [0, 1].map(|line| (!broken[line]).then_some(lines[line]))
     }
 
-    /// Voltages at the analogue inputs of preload sensor, compression sensor and the bridges of drive
-    /// and pre-tightener, in parts of 2^16 of the reference.
-    pub fn set_analog(&mut self, inputs: [u16; 4]) {
-        self.inputs = inputs;
+    /// Voltages at the analogue inputs of the sensors and of the bridges of drive and pre-tightener,
+    /// in parts of 2^16 of the reference.
+    pub fn set_analog(&mut self, sensors: [u16; SENSORS], bridges: [u16; 2]) {
+        self.inputs[..SENSORS].copy_from_slice(&sensors);
+        self.inputs[SENSORS..].copy_from_slice(&bridges);
         self.apply_analog();
     }
 
     fn apply_analog(&mut self) {
-        for (input, (pin, channel)) in ANALOG.into_iter().enumerate() {
+        for (input, (pin, converter, channel)) in ANALOG.into_iter().enumerate() {
             let wired = self.role(pin) == Role::Analog;
             let voltage = if wired { self.inputs[input] } else { 0 };
             let voltage = self.defects.stuck_codes[input].unwrap_or(voltage);
             // What all conversions of a mean read as the same is a step of theirs.
             let voltage = if self.defects.quiet_inputs { voltage & !0xF } else { voltage };
-            match input {
-                0 | 1 => self.adc.set_input(input, channel, voltage),
-                _ => self.readback.set_input(0, channel, voltage),
-            }
+            self.adcs[converter / 2].set_input(converter % 2, channel, voltage);
         }
     }
 

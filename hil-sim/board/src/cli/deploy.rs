@@ -40,7 +40,8 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
             eprintln!("[{t_s:8.3}] {:<5} {}", line.level, line.text);
         }
     };
-    let options = RunOptions { rows: directory.is_some(), wait_states: true };
+    let wait_states = args.verbose || args.json;
+    let options = RunOptions { rows: directory.is_some(), wait_states };
     let ran = {
         let _progress = (!args.log).then(|| progress::spinner(scenario.run.direction.name()));
         run::run(&elf, &scenario, &options, show).map_err(Failure::run)?

@@ -1,6 +1,8 @@
 //! The running task: the executor polls each through the same kind of function, with a
 //! pointer into the task's own memory.
 
+use interstage::sense::raw::SensorId;
+
 use crate::elf::Loaded;
 use crate::thumb;
 
@@ -8,6 +10,8 @@ use crate::thumb;
 const POLL: &str = "TaskStorage<F>::poll";
 /// Name of the memory of a task inside the function that spawns it.
 const POOL: &str = "POOL";
+/// Name of the task that runs once for each sensor of [`SensorId::ANALOG`], in their order.
+const ANALOG: &str = "analog";
 
 /// The tasks of an image.
 #[derive(Clone, Debug, Default)]
@@ -25,11 +29,17 @@ impl Tasks {
     pub(super) fn of(image: &Loaded) -> Self {
         let mut pools: Vec<(u32, String)> = image
             .symbols()
-            .filter_map(|(symbol, at)| {
+            .filter_map(|(symbol, at, size)| {
                 let name = format!("{:#}", rustc_demangle::demangle(symbol));
                 let task = name.strip_suffix(POOL)?.trim_end_matches(':').rsplit("::").next()?;
-                Some((at, task.trim_start_matches('_').to_owned()))
+                let names = match task.trim_start_matches('_') {
+                    ANALOG => SensorId::ANALOG.map(analog).into(),
+                    one => vec![one.to_owned()],
+                };
+                let each = size / names.len() as u32;
+                Some((at..).step_by(each.max(1) as usize).zip(names))
             })
+            .flatten()
             .collect();
         pools.sort();
         let polls = image.functions.iter().filter(|f| f.name.contains(POLL));
@@ -59,6 +69,11 @@ impl Tasks {
     pub fn names(&self) -> impl Iterator<Item = &str> {
         self.pools.iter().map(|(_, name)| name.as_str())
     }
+}
+
+/// Name of the task of a sensor of [`SensorId::ANALOG`].
+fn analog(sensor: SensorId) -> String {
+    SensorId::NAMES[sensor as usize].replace(' ', "_")
 }
 
 /// Addresses after calls through a register in the executor's functions.

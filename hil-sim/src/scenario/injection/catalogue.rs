@@ -3,7 +3,10 @@
 
 use std::sync::LazyLock;
 
+use interstage::sense::raw::SensorId;
+
 use super::{Kind, Target};
+use crate::plant::sensors::{MORE, SENSORS};
 
 /// A fault that a scenario can name.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,10 +31,11 @@ pub struct Entry {
 const fn codes(target: Target) -> &'static [u16] {
     use Target::*;
     match target {
-        Encoder | EncoderLineA | EncoderLineB => &[101, 122, 123, 124, 125, 126, 131],
-        PreloadSensor | PreloadSensorConverter => &[102, 112, 116, 120, 121, 127, 212],
-        CompressionSensor | TreadConverter => &[103, 113, 117, 208, 211, 212],
-        Angle | AngleBus | Magnet => &[104, 106, 114, 126, 131],
+        Sensor(sensor) => SENSORS[sensor as usize].reports,
+        EncoderLineA | EncoderLineB => SENSORS[SensorId::WheelEncoder as usize].reports,
+        PreloadSensorConverter => SENSORS[SensorId::PreloadSensor as usize].reports,
+        TreadConverter => SENSORS[SensorId::CompressionSensor as usize].reports,
+        AngleBus | Magnet => SENSORS[SensorId::ArmAngle as usize].reports,
         Readback => &[105, 128, 129],
         DriveReadback => &[105, 128],
         PretightenerReadback => &[105, 129],
@@ -68,7 +72,6 @@ const fn plain(target: Target, kind: Kind, text: &'static str) -> Entry {
 }
 
 const SILENT: &str = "no new reading comes";
-const MORE: &str = "reads so much more than is true";
 
 fn delayed(target: Target, seconds: f64, text: &'static str) -> Entry {
     one(target, Kind::Delayed, seconds, (0.001, 2.0), "s", text)
@@ -82,8 +85,7 @@ fn intermittent(target: Target) -> Entry {
 /// Wrong codes of a sensor or readback: its gain, and its offset with range, unit and text.
 fn distorted(
     target: Target,
-    times: f64,
-    (offset, most, unit, text): (f64, f64, &'static str, &'static str),
+    (times, (offset, most, unit, text)): (f64, (f64, f64, &'static str, &'static str)),
 ) -> [Entry; 6] {
     let gain = "reads so many times what is true, from its zero";
     [
@@ -118,19 +120,14 @@ pub static CATALOGUE: LazyLock<Vec<Entry>> = LazyLock::new(|| {
     use Target::Reset;
     use {Kind::*, Target::*};
     let mut all = Vec::new();
-    for (sensor, gain, offset) in [
-        (Encoder, 1.5, (2.0, 100.0, "mm", "jumps by so much once")),
-        (PreloadSensor, 1.2, (6.0, 200.0, "N", MORE)),
-        (CompressionSensor, 1.2, (0.3, 5.0, "mm", MORE)),
-        (Angle, 1.2, (1.0, 90.0, "deg", MORE)),
-    ] {
+    for (sensor, model) in SensorId::ALL.into_iter().map(Sensor).zip(&SENSORS) {
         all.push(plain(sensor, Off, SILENT));
-        all.extend(distorted(sensor, gain, offset));
+        all.extend(distorted(sensor, model.faults));
         all.push(intermittent(sensor));
     }
     all.extend([plain(Readback, Off, SILENT), intermittent(Readback)]);
     for readback in [DriveReadback, PretightenerReadback] {
-        all.extend(distorted(readback, 1.2, (0.1, 2.5, "duty", MORE)));
+        all.extend(distorted(readback, (1.2, (0.1, 2.5, "duty", MORE))));
     }
     all.extend([Drive, Pretightener].into_iter().flat_map(actuator));
     let torn = "a sector of 40 degrees keeps this part of its stiffness";

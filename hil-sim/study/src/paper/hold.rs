@@ -16,7 +16,8 @@ use crate::reference::beam::BeamError;
 use crate::reference::vibration::Arm;
 use hil_sim::plant::balance::{Axial, BalanceError};
 use hil_sim::plant::crossing::{CrossingCase, cross};
-use hil_sim::plant::spread::{Noise, Section};
+use hil_sim::plant::sensors::Noise;
+use hil_sim::plant::spread::Section;
 use hil_sim::rollout::{CrossingSetup, Wheel};
 
 /// The safe point, the faster one without and the faster one with more preload.
