@@ -14,7 +14,7 @@ mod measure;
 
 use self::measure::is_clear;
 use crate::numeric::{LowPass, LowPassState, between, sqrt};
-use crate::units::{Direction, Millimetres, Q16, Ratio, Travel, q16};
+use crate::units::{Direction, Millimetres, Q16, Travel, q16};
 
 /// Rise above which the baseline is held, mm: two steps of the angle code.
 const HOLD: Millimetres = q16(80_000);
@@ -58,10 +58,6 @@ pub struct CrossingWatch {
     step: Millimetres,
     /// Baseline of the outermost wall by the table, mm.
     outermost: Millimetres,
-    /// Part of the compression before a step that the tread still has when the lower
-    /// wall stops carrying, and the most that it still has, over the half width of the patch.
-    memory: Ratio,
-    most_kept: Ratio,
     baseline: LowPass,
     settle: LowPass,
 }
@@ -167,8 +163,8 @@ pub struct WatchInput {
     pub over: bool,
     /// The wheel is clear of the step behind; none where only the ground can show that.
     pub clear: Option<bool>,
-    /// Compression by the lower wall at which the tread's memory lets go of it, mm, if that is known.
-    pub short: Option<Millimetres>,
+    /// Compression by the lower wall at which the tread's memory lets go of it, mm.
+    pub short: Millimetres,
 }
 
 impl CrossingWatch {
@@ -393,10 +389,7 @@ impl CrossingWatch {
     ) -> Option<CrossingEvent> {
         // Height of the centre that the tread's memory still lacks at this instant.
         let short = match direction {
-            Direction::Deploy => seen.short.unwrap_or_else(|| {
-                let flat = state.flat.max(Q16::ZERO);
-                (flat * self.memory).min(sqrt(flat * (self.radius + self.radius)) * self.most_kept)
-            }),
+            Direction::Deploy => seen.short,
             Direction::Retract => Q16::ZERO,
         };
         let free = match direction {

@@ -62,22 +62,16 @@ impl Estimator {
         let seen = self.watch_input(state, tick.sensed);
         let event = self.watch.step(&mut state.watch, direction, &seen);
         let on_corner = state.on_corner();
-        let rigid = self.shear.is_rigid();
-        let creep = if rigid { self.creep.outwards(tick.pressed) } else { Ratio::ZERO };
         let rolling = Rolling {
             radius: tick.sensed.radius.value,
-            lag: self.worn
-                + self.rolling_lag * tick.sensed.compression_filtered
-                + creep * Q16::from_num(direction.sign()),
+            lag: self.worn + self.rolling_lag * tick.sensed.compression_filtered,
             on_corner,
         };
         state.odometry.roll(tick.sensed.travel, &rolling, event.is_some());
         state.begin_tick(tick.sensed.travel);
-        if !rigid {
-            let pulled = self.pulled(state, tick);
-            let (wind_up, odometry) = (&mut state.wind_up, &mut state.odometry);
-            self.shear.step(wind_up, odometry, tick.sensed.travel, &pulled);
-        }
+        let pulled = self.pulled(state, tick);
+        let (wind_up, odometry) = (&mut state.wind_up, &mut state.odometry);
+        self.shear.step(wind_up, odometry, tick.sensed.travel, &pulled);
         if let Some(open) = state.crossing.as_mut() {
             open.peak_preload = open.peak_preload.max(tick.sensed.preload_filtered);
         }

@@ -63,8 +63,6 @@ pub struct Odometry {
     from: Option<Start>,
     /// A slip has been taken off it since its origin.
     slipped: bool,
-    /// The tread winds up and creeps, as far as known.
-    pub(super) gives: bool,
 }
 
 /// Place, scale, giving way and sight.
@@ -72,7 +70,19 @@ const STATES: usize = 4;
 
 impl Default for Odometry {
     fn default() -> Self {
-        Self::fresh(false)
+        Self {
+            offset: Travel::ZERO,
+            scale: Ratio::ZERO,
+            origin: Millimetres::ZERO,
+            more: Ratio::ZERO,
+            gave: Millimetres::ZERO,
+            sight: Millimetres::ZERO,
+            covariance: independent([KNOWN, UNKNOWN_RADIUS, UNKNOWN_GIVE, UNKNOWN_SIGHT]),
+            share: Ratio::ZERO,
+            gains: [Ratio::ZERO; STATES],
+            from: None,
+            slipped: false,
+        }
     }
 }
 
@@ -108,29 +118,10 @@ impl Odometry {
         Q16::narrow(position)
     }
 
-    /// Nothing seen yet; whether the tread `gives` way along the wall.
-    fn fresh(gives: bool) -> Self {
-        let [give, sight] = if gives { [UNKNOWN_GIVE, UNKNOWN_SIGHT] } else { [Ratio::ZERO; 2] };
-        Self {
-            offset: Travel::ZERO,
-            scale: Ratio::ZERO,
-            origin: Millimetres::ZERO,
-            more: Ratio::ZERO,
-            gave: Millimetres::ZERO,
-            sight: Millimetres::ZERO,
-            covariance: independent([KNOWN, UNKNOWN_RADIUS, give, sight]),
-            share: Ratio::ZERO,
-            gains: [Ratio::ZERO; STATES],
-            from: None,
-            slipped: false,
-            gives,
-        }
-    }
-
     /// Declares that the wheel is at `position`.
     pub fn set(&mut self, travel: Travel, position: Millimetres) {
         let offset = position.widen().saturating_sub(travel);
-        *self = Self { offset, origin: position, ..Self::fresh(self.gives) };
+        *self = Self { offset, origin: position, ..Self::default() };
     }
 
     /// Declares that the wheel is at `position` because a step was found: as sure as that
@@ -144,7 +135,7 @@ impl Odometry {
     /// Begins a run at `position`: what moved the arm since the last one was no rolling.
     pub fn begin_run(&mut self, position: Millimetres) {
         let place = between(self.variance(position), KNOWN, Ratio::ONE);
-        *self = Self { offset: self.offset, origin: position, ..Self::fresh(self.gives) };
+        *self = Self { offset: self.offset, origin: position, ..Self::default() };
         self.covariance[0][0] = place;
     }
 

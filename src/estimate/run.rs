@@ -29,9 +29,8 @@ impl Estimator {
         let turned = state.direction != direction;
         state.direction = direction;
         state.leaving = None;
-        state.odometry.gives = !self.shear.is_rigid();
         state.odometry.begin_run(state.position);
-        if state.crossing.is_none() && !self.shear.is_rigid() {
+        if state.crossing.is_none() {
             self.shear.rest(&mut state.wind_up, load);
         }
         if let Some(open) = state.crossing.as_mut() {

@@ -27,7 +27,7 @@ const LEAST: Millimetres = q16(50_000);
 /// Rubber between rim and hub.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(super) struct Shear {
-    /// Displacement of the relaxed tread per traction, mm/N; 0: rigid.
+    /// Displacement of the relaxed tread per traction, mm/N.
     compliance: Q16,
     /// Instant over relaxed stiffness, less 1.
     stiffens: Ratio,
@@ -83,9 +83,6 @@ impl Shear {
     /// The tread of a rig; fails where a parameter is out of range.
     #[allow(clippy::float_arithmetic, reason = "SI to machine units, once at start")]
     pub(super) fn try_build(rig: &Rig) -> Result<Self, RigError> {
-        if rig.tread.thickness_mm == 0.0 {
-            return Ok(Self::default());
-        }
         let shear = rig.shear();
         let key = "tread.thickness_mm";
         Ok(Self {
@@ -98,16 +95,9 @@ impl Shear {
         })
     }
 
-    /// Whether the tread is rigid along the wall.
-    pub(super) fn is_rigid(&self) -> bool {
-        self.compliance == Q16::ZERO
-    }
-
-    /// Compression by a wall at which the tread's memory q lets go of it, mm: `q (s - 1) / s`. None of
-    /// a rigid tread.
-    pub(super) fn short(&self, state: &WindUp) -> Option<Millimetres> {
-        let part = divide(self.stiffens, Ratio::ONE + self.stiffens);
-        (!self.is_rigid()).then(|| state.floor * part)
+    /// Compression by a wall at which the tread's memory q lets go of it, mm: `q (s - 1) / s`.
+    pub(super) fn short(&self, state: &WindUp) -> Millimetres {
+        state.floor * divide(self.stiffens, Ratio::ONE + self.stiffens)
     }
 
     /// A run begins, on a wall: the tread has relaxed under its load.

@@ -226,7 +226,7 @@ impl Rig {
     }
 
     /// Keys with their value and its least and largest value.
-    pub const fn bounds(&self) -> [(&'static str, f64, f64, f64); 47] {
+    pub const fn bounds(&self) -> [(&'static str, f64, f64, f64); 46] {
         [
             ("rig.wheel_radius_mm", self.rig.wheel_radius_mm, 10.0, 150.0),
             ("rig.wheel_wear_mm", self.rig.wheel_wear_mm, 0.0, 0.2),
@@ -240,13 +240,12 @@ impl Rig {
             ("tread.k_inf_pa_per_m", self.tread.k_inf_pa_per_m, 1e7, 5e10),
             ("tread.stiffening", self.tread.stiffening, 1.0, 20.0),
             ("tread.tau_s", self.tread.tau_s, 1e-3, 10.0),
-            ("tread.thickness_mm", self.tread.thickness_mm, 0.0, 16.0),
+            ("tread.thickness_mm", self.tread.thickness_mm, 3.0, 16.0),
             ("plant.mu", self.plant.mu, 0.0, 3.0),
             ("plant.top_load_n", self.plant.top_load_n, 0.0, 200.0),
             ("plant.top_load_share", self.plant.top_load_share, 0.0, 1.0),
             ("plant.moved_mass_kg", self.plant.moved_mass_kg, 0.01, 100.0),
             ("plant.arm_coupling", self.plant.arm_coupling, -1.0, 1.0),
-            ("plant.elastic_creep", self.plant.elastic_creep, 1e-4, 0.2),
             ("preload.cruise_n", self.preload.cruise_n, 5.0, 180.0),
             ("preload.limit_n", self.preload.limit_n, 5.0, 180.0),
             ("preload.spring_n_per_mm", self.preload.spring_n_per_mm, 0.1, 20.0),

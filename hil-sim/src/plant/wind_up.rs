@@ -9,14 +9,10 @@ use interstage::rig::shear;
 
 use super::ring::RingParameters;
 
-/// Thickness for a tread of independent elements, mm: its layer has the gaps nearest to theirs.
-/// Chosen, as the thickness is not published.
-pub const NOMINAL_THICKNESS_MM: f64 = 8.0;
-
 /// Rubber between rim and hub, displaced along the wall.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shear {
-    /// Stiffness of the relaxed tread along the wall, N/mm; infinite where it is rigid.
+    /// Stiffness of the relaxed tread along the wall, N/mm.
     pub n_per_mm: f64,
     /// Relaxation length over the length of the contact.
     pub relaxation_lengths: f64,
@@ -49,7 +45,7 @@ pub struct Winding {
 }
 
 impl Shear {
-    /// The layer of this wheel, `compliance` times as compliant; 0: rigid.
+    /// The layer of this wheel, `compliance` times as compliant.
     pub fn of(ring: &RingParameters, compliance: f64) -> Self {
         let thickness = ring.thickness_mm();
         let layer = shear::Shear::of_layer(ring.radius_mm, ring.width_mm, thickness, ring.k_inf);
@@ -59,11 +55,6 @@ impl Shear {
             stiffening: ring.k_0 / ring.k_inf,
             relaxations_s: ring.relaxations_s(),
         }
-    }
-
-    /// Whether it gives way at all.
-    pub fn gives_way(&self) -> bool {
-        self.n_per_mm.is_finite()
     }
 
     /// Stiffness in steady rolling that renews the tread in contact at this rate, 1/s, N/mm.
@@ -77,7 +68,7 @@ impl Shear {
 impl RingParameters {
     /// Thickness of the tread as a layer, mm.
     fn thickness_mm(&self) -> f64 {
-        if self.is_coupled() { self.tread_thickness_mm } else { NOMINAL_THICKNESS_MM }
+        if self.is_coupled() { self.tread_thickness_mm } else { self.layer_mm }
     }
 }
 
@@ -113,9 +104,6 @@ impl WindUp {
 
     /// Stored energy, mJ.
     pub fn stored_mj(&self, shear: &Shear) -> f64 {
-        if !shear.gives_way() {
-            return 0.0;
-        }
         let more = 0.5 * (shear.stiffening - 1.0);
         let branches: f64 = self.memory_mm.iter().map(|q| more * (self.mm - q).powi(2)).sum();
         0.5 * shear.n_per_mm * (self.mm * self.mm + branches)
@@ -201,7 +189,6 @@ mod tests {
         }
         let wall = compliance_of(25.0, 8.0, 2.5) / compliance_of(25.0, 8.0, 6.0);
         assert!((1.2..1.25).contains(&wall), "{wall}");
-        assert!(!Shear::of(&ring(0.0), 0.0).gives_way());
     }
 
     /// Whatever the course of the traction, no more comes back than was put in.
