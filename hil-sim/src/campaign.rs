@@ -1,4 +1,5 @@
-//! A campaign: many cases, each computed by itself, and what is made of all of them.
+//! A campaign: many cases, each computed by itself, and what is made of all of them. Each is in a
+//! module of its own (`montecarlo` is an example), its verb in `cli/` gives it to `cli::Verb`.
 
 mod frame;
 mod shard;

@@ -98,7 +98,7 @@ struct Passed {
 }
 
 impl Verb {
-    /// How the verb runs its campaign, if it has one.
+    /// How the verb runs its campaign, if it has one; one that is not here cannot be merged.
     fn campaign(&mut self) -> Option<&mut CampaignArgs> {
         match self {
             Self::Compare(args) => Some(&mut args.campaign),

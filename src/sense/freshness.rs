@@ -1,4 +1,4 @@
-//! Validity of a reading: when it was taken, and whether its sensor still answers.
+//! A reading: when it was taken, whether its sensor still answers, and its low-pass.
 
 #![deny(clippy::float_arithmetic)]
 

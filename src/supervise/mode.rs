@@ -37,7 +37,7 @@ pub enum Mode {
     Boot,
     /// Checking that readings are in range and at rest.
     SelfTest,
-    /// Averaging the zero of pressure and displacement, unloaded.
+    /// Averaging the zeros of preload and compression sensor, unloaded.
     Zero,
     /// At rest, bridges off, gears holding.
     Idle,

@@ -54,7 +54,7 @@ pub struct CrossingRecord {
     pub position: Millimetres,
     /// Found position minus table, mm; 0 for a step that the table lacks.
     pub residual: Millimetres,
-    /// Speed at floor lift-off (touch-down on retract), mm/s.
+    /// Speed as the lower wall stops (retract: begins) to carry, mm/s.
     pub speed: MillimetresPerSecond,
     /// Measured preload at that instant, N.
     pub preload: Newtons,
@@ -62,7 +62,7 @@ pub struct CrossingRecord {
     pub peak_preload: Newtons,
     /// Largest tread compression of the crossing, mm.
     pub compression: Millimetres,
-    /// Gap that the reduced model gives for that speed and preload, mm.
+    /// Gap of the tread rolled out along the course that was measured, mm.
     pub gap_predicted: Millimetres,
     /// Gap measured from compression and arm angle, mm.
     pub gap_measured: Millimetres,

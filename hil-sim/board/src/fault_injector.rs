@@ -233,7 +233,7 @@ struct TaskSearch {
     /// Poll functions, of which one belongs to the task.
     places: Vec<u32>,
     tried: u32,
-    /// Tasks of a pool that came in its place.
+    /// Polls of other tasks of a pool in its place, some of which are polled twice a tick.
     others: usize,
 }
 
@@ -259,7 +259,7 @@ impl TaskSearch {
             }
             machine.run_on(machine.now() + 1)?;
             self.others += 1;
-            if self.others == SensorId::ANALOG.len() {
+            if self.others == 4 * SensorId::ANALOG.len() {
                 self.others = 0;
                 self.places.remove(0);
             }

@@ -184,7 +184,7 @@ impl Point {
                     "completed": summary.completed,
                     "max_gap_mm": summary.max_gap_mm,
                     "gap_over_ref": (summary.gap_ref_mm > 0.0).then_some(over_ref),
-                    "duration_s": summary.duration_s,
+                    "duration_s": summary.duration_s.filter(|_| summary.completed),
                     "slip_mm": summary.slip_mm,
                     "faults": summary.faults.iter().map(|fault| fault.code).collect::<Vec<_>>(),
                 })

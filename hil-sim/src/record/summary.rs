@@ -8,7 +8,7 @@ use serde_json::{Map, Value};
 
 use super::{Tick, TimeLost};
 
-/// Ledger line of one crossing: the plant's truth beside the controller's view.
+/// A row of the page's table of crossings: the plant's truth beside what the controller reports.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct CrossingLine {
     /// Step number, from 1.

@@ -49,7 +49,7 @@ pub fn html(recording: &Recording, more: &[Section]) -> String {
         "Crossings",
         &format!(
             include_str!("crossings.html"),
-            tables::ledger(&s.crossings),
+            tables::crossings(&s.crossings),
             if s.measured {
                 "Every figure of this log is measured or estimated by the controller; where a step was \
 found is compared with the step table. Slip includes creep and the steps' tolerances."
@@ -103,7 +103,7 @@ pub fn log_html(boots: &[Recording]) -> String {
             gap_sentence(s),
             slip_sentence(s),
             lost.collect::<String>(),
-            tables::ledger(&s.crossings),
+            tables::crossings(&s.crossings),
             tables::reports(s),
             folded("The crossings enlarged", &crossings::html(boot)),
             folded("Lines of the log", &tables::log(&boot.log)),

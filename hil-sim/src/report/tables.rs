@@ -56,7 +56,7 @@ fn with_unit(value: impl Into<Option<f64>>, decimals: usize, unit: &str) -> Stri
     value.map_or_else(String::new, |value| format!("{} {unit}", number(value, decimals)))
 }
 
-pub(super) fn ledger(crossings: &[CrossingLine]) -> String {
+pub(super) fn crossings(crossings: &[CrossingLine]) -> String {
     if crossings.is_empty() {
         return "<p>No crossing is complete in the log.</p>\n".to_owned();
     }

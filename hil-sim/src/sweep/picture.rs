@@ -32,17 +32,12 @@ pub fn picture(axes: &[Axis], rows: &[Map<String, Value>], plots: &[Plot]) -> Op
     let mut seen = std::collections::HashSet::new();
     names.retain(|name| seen.insert(name.clone()));
     let number = |row: &Map<String, Value>, key: &str| row[key].as_f64().unwrap_or(f64::NAN);
-    // A run that did not arrive has no duration.
-    let figure = |row: &Map<String, Value>, key: &str| {
-        let is_none = key == "duration_s" && row["completed"] == false;
-        if is_none { f64::NAN } else { number(row, key) }
-    };
     let range = axis::padded(axis::extent(rows.iter().map(|row| number(row, &x.key)))?, 0.02);
     let panel = |plot: &Plot| {
         let line = |(place, name): (usize, &String)| {
             let own = rows.iter().filter(|row| group(row) == *name);
             let mut points: Vec<(f64, f64)> =
-                own.map(|row| (number(row, &x.key), figure(row, plot.column))).collect();
+                own.map(|row| (number(row, &x.key), number(row, plot.column))).collect();
             points.sort_by(|a, b| a.0.total_cmp(&b.0));
             let name = if name.is_empty() { plot.title } else { name };
             let look = Look::Other(palette::SERIES[1..][place % 6], 2.0);
@@ -74,7 +69,7 @@ mod tests {
         let axis =
             Axis { key: "x".to_owned(), values: ["1", "2", "3"].map(str::to_owned).to_vec() };
         let row = |x: u8, completed: bool| {
-            let row = json!({ "x": x, "completed": completed, "duration_s": x });
+            let row = json!({ "x": x, "duration_s": completed.then_some(x) });
             row.as_object().cloned().unwrap_or_default()
         };
         let plot = Plot { column: "duration_s", title: "Duration", y_name: "duration, s" };
