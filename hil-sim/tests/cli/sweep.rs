@@ -1,6 +1,6 @@
 //! `rig sweep`.
 
-use super::{good_in, number, object, refused, rig_in, stdout};
+use super::{good_in, number, object, refused, rig, rig_in, stdout};
 
 #[test]
 fn a_grid_of_deployments_has_rows_table_and_picture() {
@@ -85,4 +85,11 @@ fn what_cannot_be_swept_is_refused_before_anything_runs() {
     refused(&["sweep", "--crossing", "--key", "speed_mm_s=0,5"], &["--key speed_mm_s 0"]);
     let twice = ["sweep", "--key", "plant.mu=1,2", "--key", "plant.mu=1,2"];
     refused(&twice, &["plant.mu: given twice"]);
+}
+
+#[test]
+fn a_run_that_does_not_arrive_has_no_duration() {
+    let rows = object(&rig(&["sweep", "--no-files", "--json", "--key", "plant.mu=0.7,1.1"]));
+    let [slips, arrives] = [0, 1].map(|row| &rows["rows"][row]["duration_s"]);
+    assert!(slips.is_null() && arrives.is_f64(), "{rows}");
 }
