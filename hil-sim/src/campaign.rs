@@ -1,5 +1,5 @@
-//! A campaign: many cases, each computed by itself, and what is made of all of them. Each is in a
-//! module of its own (`montecarlo` is an example), its verb in `cli/` gives it to `cli::Verb`.
+//! A campaign: many cases, each computed by itself, and what is made of all of them. Each but
+//! `sweep`'s is in a module of its own (as in `montecarlo`); its verb in `cli/` names it in `cli.rs`.
 
 mod frame;
 mod shard;
