@@ -176,11 +176,9 @@ fn gap_ref(scenario: &Scenario, direction: units::Direction) -> f64 {
 fn a_run_stopped_anywhere_goes_on_to_its_end() {
     check_each(sample(everywhere()), |case| {
         let Case { scenario, name, .. } = case;
-        let direction = scenario.run.direction;
         let mut bench = stopped(case);
-        bench.give(starter(direction));
-        bench.finish();
-        assert_arrived(&bench, scenario, direction, name);
+        bench.go(scenario.run.direction);
+        assert_arrived(&bench, scenario, scenario.run.direction, name);
         assert_three_crossings(&bench, scenario, name);
     });
 }
@@ -197,8 +195,7 @@ fn a_run_stopped_while_the_preload_builds_starts_again() {
         assert_eq!(bench.mode(), Mode::Idle);
         assert!(bench.now().is_off());
         bench.run_s(0.5);
-        bench.give(starter(direction));
-        bench.finish();
+        bench.go(direction);
         assert_arrived(&bench, &scenario, direction, direction.name());
         assert_three_crossings(&bench, &scenario, direction.name());
     }
@@ -228,8 +225,7 @@ fn a_run_turned_back_anywhere_returns() {
         let Case { scenario, name, .. } = case;
         let home = opposite(scenario.run.direction);
         let mut bench = stopped(case);
-        bench.give(starter(home));
-        bench.finish();
+        bench.go(home);
         assert_arrived(&bench, scenario, home, name);
         assert_sound_records(&bench, scenario, name);
     });
@@ -241,8 +237,7 @@ fn a_session_goes_out_back_and_out_again() {
         let scenario = scenario(rig, Direction::Deploy, 0);
         let mut bench = Bench::idle(&scenario);
         for direction in [Direction::Deploy, Direction::Retract, Direction::Deploy] {
-            bench.give(starter(direction));
-            bench.finish();
+            bench.go(direction);
             assert_arrived(&bench, &scenario, direction, rig);
             bench.run_s(1.0);
             assert!(bench.now().is_off(), "{rig}");
@@ -425,8 +420,7 @@ fn reset(case: &Case, sensor: &Silence) -> Bench {
     bench.give(Command::Reset);
     bench.until("idle", 1.0, |now| now.seen.mode == Mode::Idle);
     assert!(bench.now().is_off());
-    bench.give(starter(case.scenario.run.direction));
-    bench.finish();
+    bench.go(case.scenario.run.direction);
     bench
 }
 
@@ -452,8 +446,7 @@ fn after_power_loss(at_mm: f64, direction: Direction) -> Bench {
     bench.session.reboot();
     bench.tick();
     bench.until("idle", 1.0, |now| now.seen.mode == Mode::Idle);
-    bench.give(starter(direction));
-    bench.finish();
+    bench.go(direction);
     bench
 }
 

@@ -60,9 +60,9 @@ impl Estimator {
     }
 
     /// A step whose wall behind it was not measured.
-    pub(super) fn as_table(&self, gap: Millimetres) -> Measured {
+    pub(super) fn as_table(&self, gap_as_table: Millimetres) -> Measured {
         let (height, shift) = (self.steps.height(), Q16::ZERO);
-        Measured { height, gap, as_table: gap, shift, plausible: false }
+        Measured { height, gap: gap_as_table, gap_as_table, shift, plausible: false }
     }
 
     /// The crossing is behind: its step corrects the position, and it is reported for review,
@@ -117,7 +117,7 @@ impl Estimator {
                 point.residual += left;
                 state.begin_tick(sensed.travel);
             }
-            point.gap = measured.as_table;
+            point.gap_as_table = measured.gap_as_table;
             open.lift = Some(point);
             // Closed at the end of travel, the wheel may still be on its corner.
             state.leaving = Some(point.face);
@@ -157,7 +157,7 @@ impl Estimator {
 pub(super) struct Measured {
     pub(super) height: Millimetres,
     pub(super) gap: Millimetres,
-    pub(super) as_table: Millimetres,
+    pub(super) gap_as_table: Millimetres,
     pub(super) shift: Millimetres,
     pub(super) plausible: bool,
 }

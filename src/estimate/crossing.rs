@@ -115,7 +115,7 @@ pub struct Lift {
     /// Height of the centre above the lower wall, mm.
     pub height: Millimetres,
     /// Gap with the nominal step height, mm.
-    pub gap: Millimetres,
+    pub gap_as_table: Millimetres,
     /// Axial distance between wheel centre and face, mm.
     pub distance: Millimetres,
 }
@@ -138,7 +138,7 @@ pub enum CrossingEvent {
         /// Gap with that height.
         gap: Millimetres,
         /// Gap of a wheel as deep in the corner at the nominal height.
-        as_table: Millimetres,
+        gap_as_table: Millimetres,
         /// By how much that height changes the distance to the face at the lift.
         shift: Millimetres,
         /// The measured height lies within [`HEIGHT_MOST`] of the table.
@@ -148,7 +148,7 @@ pub enum CrossingEvent {
     /// last one with the nominal height, mm.
     Retouched {
         /// Gap.
-        gap: Millimetres,
+        gap_as_table: Millimetres,
     },
 }
 
@@ -443,10 +443,10 @@ impl CrossingWatch {
                 Direction::Retract => self.step,
             };
             let base = state.baseline.output() + shift;
-            let gap = state.lift.map_or(Q16::ZERO, |lift| lift.gap);
+            let gap_as_table = state.lift.map_or(Q16::ZERO, |lift| lift.gap_as_table);
             state.baseline = LowPassState::at(base);
             self.touch(state, direction, seen);
-            return Some(CrossingEvent::Retouched { gap });
+            return Some(CrossingEvent::Retouched { gap_as_table });
         }
         if !is_clear(state, seen) {
             state.ticks = 0;
@@ -463,23 +463,24 @@ impl CrossingWatch {
         let height = (state.baseline.output() - state.next.output()).abs();
         let plausible = (height - self.step).abs() <= HEIGHT_MOST;
         let height = if plausible { height } else { self.step };
-        let [gap, as_table, shift] = state.lift.map_or([Q16::ZERO; 3], |lift| match direction {
-            Direction::Deploy => {
-                let seen = self.measure(lift.depth, lift.height, height);
-                [seen.gap, lift.gap, seen.distance - lift.distance]
-            }
-            // The lower wall carries from the height on that is known now. The edge was seen
-            // from the upper wall.
-            Direction::Retract => {
-                let depth = self.depth_at(state, height).unwrap_or(lift.depth);
-                let gap = |step| self.measure(depth, self.radius, step).gap;
-                [gap(height), gap(self.step), Q16::ZERO]
-            }
-        });
+        let [gap, gap_as_table, shift] =
+            state.lift.map_or([Q16::ZERO; 3], |lift| match direction {
+                Direction::Deploy => {
+                    let seen = self.measure(lift.depth, lift.height, height);
+                    [seen.gap_as_table, lift.gap_as_table, seen.distance - lift.distance]
+                }
+                // The lower wall carries from the height on that is known now. The edge was seen
+                // from the upper wall.
+                Direction::Retract => {
+                    let depth = self.depth_at(state, height).unwrap_or(lift.depth);
+                    let gap = |step| self.measure(depth, self.radius, step).gap_as_table;
+                    [gap(height), gap(self.step), Q16::ZERO]
+                }
+            });
         state.baseline = state.next;
         state.contact = Contact::Wall;
         state.ticks = 0;
-        Some(CrossingEvent::GapClosed { height, gap, as_table, shift, plausible })
+        Some(CrossingEvent::GapClosed { height, gap, gap_as_table, shift, plausible })
     }
 
     /// A corner begins to carry.

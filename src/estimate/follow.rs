@@ -78,12 +78,12 @@ impl Estimator {
             Some(CrossingEvent::Released) => state.crossing = None,
             Some(CrossingEvent::Lifted(lift)) => self.lifted(state, tick, lift, &mut found),
             Some(CrossingEvent::Passed) => passed(state),
-            Some(CrossingEvent::GapClosed { height, gap, as_table, shift, plausible }) => {
-                let measured = Measured { height, gap, as_table, shift, plausible };
+            Some(CrossingEvent::GapClosed { height, gap, gap_as_table, shift, plausible }) => {
+                let measured = Measured { height, gap, gap_as_table, shift, plausible };
                 self.close(state, tick.sensed, &measured, &mut found);
             }
-            Some(CrossingEvent::Retouched { gap }) => {
-                self.close(state, tick.sensed, &self.as_table(gap), &mut found);
+            Some(CrossingEvent::Retouched { gap_as_table }) => {
+                self.close(state, tick.sensed, &self.as_table(gap_as_table), &mut found);
                 self.touched(state, tick, &mut found);
             }
         }
@@ -147,7 +147,7 @@ impl Estimator {
     pub fn close_crossing(&self, state: &mut EstimateState, sensed: &SensedState) -> Findings {
         let mut found = Findings::default();
         if let Some(point) = state.crossing.as_ref().and_then(|open| open.lift) {
-            self.close(state, sensed, &self.as_table(point.gap), &mut found);
+            self.close(state, sensed, &self.as_table(point.gap_as_table), &mut found);
         }
         found
     }
@@ -319,7 +319,7 @@ impl Estimator {
         open.lift = Some(LiftPoint {
             at: tick.now,
             position: state.position,
-            gap: lift.gap,
+            gap_as_table: lift.gap_as_table,
             history: *state.history.history(),
             distance: lift.distance,
             speed: state.crossing_speed.speed(FILTER_LAG, sensed.speed.value),

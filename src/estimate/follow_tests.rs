@@ -105,7 +105,7 @@ fn a_step_off_its_height_is_reported_and_its_gap_learned_from_as_the_table_has_i
         estimator.close(&mut state, &sensed, &measured, &mut found);
         assert_eq!(found.limits.contains(&Limit::StepHeight), reported, "{height}");
         let (closed, trusted) = found.closed.expect("closed");
-        let learned = closed.lift.expect("lifted").gap;
+        let learned = closed.lift.expect("lifted").gap_as_table;
         assert_eq!((closed.gap, learned, trusted), (gap, as_table, true));
         assert_eq!(state.raised, q16(height) - q16(4_000_000));
     }

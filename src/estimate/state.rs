@@ -114,7 +114,7 @@ pub struct LiftPoint {
     /// Position of the wheel, mm.
     pub position: Millimetres,
     /// Gap with the nominal step height, mm: of a wheel as deep in the corner.
-    pub gap: Millimetres,
+    pub gap_as_table: Millimetres,
     /// How the wheel came here, and its distance to the face, mm.
     pub history: History,
     /// See `history`.

@@ -271,8 +271,8 @@ mod tests {
             held: most,
             felt_at: Some(most),
             tan_arm: most,
+            gap_as_table: most,
             gap: most,
-            seen: most,
             trusted: true,
             slipped: true,
         };

@@ -82,9 +82,9 @@ pub struct Review {
     pub tan_arm: Ratio,
     /// Measured gap of a step of nominal height, mm: how high this one is shows the sleeve, not
     /// the tread.
-    pub gap: Millimetres,
+    pub gap_as_table: Millimetres,
     /// Measured gap at the step as it is, mm.
-    pub seen: Millimetres,
+    pub gap: Millimetres,
     /// Whether the gap may correct the stiffness: not after an odd crossing.
     pub trusted: bool,
     /// The wheel slipped on the corner.

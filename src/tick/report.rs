@@ -38,8 +38,8 @@ impl Controller {
                 held: point.held,
                 felt_at: open.felt.map(|_| open.felt_at),
                 tan_arm: point.tan_arm,
-                gap: point.gap,
-                seen: open.gap,
+                gap_as_table: point.gap_as_table,
+                gap: open.gap,
                 trusted: open.expected && plausible,
                 slipped: open.slip.lost > Q16::ZERO,
             });

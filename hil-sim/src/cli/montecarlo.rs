@@ -8,7 +8,7 @@ use super::campaign::{CampaignArgs, Found};
 use super::failure::{Failure, Outcome};
 use super::scenario::RunArgs;
 use crate::campaign::{Column, Frame, column};
-use crate::montecarlo::{self, Least, RunLine};
+use crate::montecarlo::{self, Drawn, Least, RunLine};
 use crate::scenario::{MismatchDraw, Scenario};
 use crate::table::{counted, number, plain, width, wrapped};
 
@@ -114,12 +114,10 @@ fn human(outcome: &montecarlo::Outcome) -> String {
         text += &wrapped(&format!("{what}: seeds {}", seeds.join(", ")), "  ", width());
     }
     if !outcome.drawn.is_empty() {
-        let rows = outcome
-            .drawn
-            .iter()
-            .map(|drawn| vec![drawn.key.clone(), number(drawn.least, 3), number(drawn.most, 3)]);
-        text += "What the controller is not told, beside the spread of the rigs\n";
-        text += &format!("{}\n", plain(&["", "least", "most"], rows));
+        let row = |d: &Drawn| vec![d.key.clone(), number(d.least, 3), number(d.most, 3)];
+        let rows = plain(&["", "least", "most"], outcome.drawn.iter().map(row));
+        text +=
+            &format!("What the controller is not told, beside the spread of the rigs\n{rows}\n");
     }
     text += "What limits it\n";
     for limit in &outcome.limits {

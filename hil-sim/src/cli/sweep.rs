@@ -75,10 +75,8 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     let axes = axes(args, &base)?;
     let places = sweep::places(&axes);
     // Everything is checked before anything is run.
-    let points: Vec<Point> = places
-        .iter()
-        .map(|place| Point::of(args, &base, &axes, place))
-        .collect::<Result<_, _>>()?;
+    let points = places.iter().map(|place| Point::of(args, &base, &axes, place));
+    let points: Vec<Point> = points.collect::<Result<_, _>>()?;
     let measure = match (args.crossing, args.driven) {
         (false, _) => RUN,
         (true, true) => CROSSING,
@@ -107,7 +105,8 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     let files = if args.no_files { Vec::new() } else { write()? };
     let printed = json!({ "rows": rows, "files": files });
     let text = || table.text(&["gap_over_ref", "faults"]) + &output::wrote(&files);
-    found.print(&args.campaign, &printed, &table, text, true)
+    let good = rows.iter().all(|row| row.get("completed") != Some(&json!(false)));
+    found.print(&args.campaign, &printed, &table, text, good)
 }
 
 /// The keys that were given, or the usual ones of a crossing.
@@ -119,11 +118,8 @@ fn axes(args: &Args, base: &Scenario) -> Result<Vec<Axis>, Failure> {
             format!("{SPEED}=2..30:15"),
             format!("{PRELOAD}={},{}", preload.cruise_n, preload.limit_n),
         ];
-        axes = usual
-            .iter()
-            .map(|text| text.parse())
-            .collect::<Result<_, _>>()
-            .map_err(Failure::run)?;
+        let usual: Result<_, _> = usual.iter().map(|text| text.parse()).collect();
+        axes = usual.map_err(Failure::run)?;
     }
     for (index, axis) in axes.iter().enumerate() {
         if axes[..index].iter().any(|other| other.key == axis.key) {

@@ -5,7 +5,6 @@
 //! Motor and pre-tightener are no part of it, so their errors do not accumulate over the
 //! travel. Derivatives are central differences of simulations.
 
-use std::f64::consts::PI;
 use std::ops::Range;
 
 use rayon::prelude::*;
@@ -227,8 +226,7 @@ pub(crate) fn derivatives(
     base: &Trajectory,
 ) -> Result<Vec<Channels>, PlantError> {
     // Steps and starts by half an element, so that elements meet the corner alike on either side.
-    let ring = &coordinates.nominal().ring;
-    let by_mm = PI * ring.radius_mm / ring.elements as f64;
+    let by_mm = 0.5 * coordinates.nominal().ring.pitch_mm();
     let places = coordinates.of_steps().chain(run.start).map(|index| (index, by_mm));
     // Friction by half of what keeps the wheel from slipping at most.
     let room = 0.5 * (x[FRICTION].exp() / base.most_utilisation).ln();
@@ -280,4 +278,25 @@ pub(crate) fn derivatives(
     }
     columns[LOAD_GAIN] = by_change(&scaled);
     Ok(columns)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scenario::Scenario;
+
+    #[test]
+    fn elements_of_any_ring_meet_a_step_alike_that_is_moved_by_one() {
+        let mut scenario = Scenario::default();
+        scenario.rig.rig.wheel_radius_mm = 40.0;
+        let [still, half, whole] = [0.0, 0.5, 1.0].map(|part| {
+            let mut plant = scenario.plant();
+            let pitch_mm = plant.ring.pitch_mm();
+            plant.wall = plant.wall.moved(&[part * pitch_mm]);
+            let mut rig = VirtualRig::new(plant, 0.0, 40.0, 1e-3);
+            (0..3000).for_each(|_| rig.follow(pitch_mm / 0.03, 40.0, 1e-3).unwrap());
+            rig.ledger().crossings()[0].gap_mm
+        });
+        assert!((whole - still).abs() < 5e-4 && (half - still).abs() > 2e-3, "{still} {half}");
+    }
 }

@@ -336,7 +336,7 @@ impl Ring {
 
     /// Area of an element, mm^2.
     fn patch(&self) -> f64 {
-        self.pitch() * self.parameters.radius_mm * self.parameters.width_mm
+        self.parameters.pitch_mm() * self.parameters.width_mm
     }
 
     fn count(&mut self) {

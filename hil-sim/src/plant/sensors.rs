@@ -53,8 +53,6 @@ pub struct SensorModel {
     pub scale: fn(&Rig) -> (f64, f64),
     /// Faults: gain by default; offset by default and at most, its unit and what it does.
     pub faults: (f64, (f64, f64, &'static str, &'static str)),
-    /// Codes of faults and limits that name the sensor.
-    pub reports: &'static [u16],
 }
 
 /// Largest code of a converter.
@@ -87,7 +85,6 @@ pub static SENSORS: [SensorModel; SensorId::COUNT] = [
         number: |p, rad, noise| rad / TAU * p.counts_per_turn + noise,
         scale: |rig| (rig.sense.encoder_counts / (TAU * rig.rig.wheel_radius_mm), 0.0),
         faults: (1.5, (2.0, 100.0, "mm", "jumps by so much once")),
-        reports: &[101, 122, 123, 124, 125, 126, 131],
     },
     SensorModel {
         coding: Coding::Converter,
@@ -96,7 +93,6 @@ pub static SENSORS: [SensorModel; SensorId::COUNT] = [
         number: |p, n, noise| bridge((n * p.preload_sensor_gain + noise) / p.preload_full_scale_n),
         scale: |rig| bridge_scale(rig.sense.preload_full_scale_n),
         faults: (1.2, (6.0, 200.0, "N", MORE)),
-        reports: &[102, 112, 116, 120, 121, 127, 212],
     },
     SensorModel {
         coding: Coding::Converter,
@@ -105,7 +101,6 @@ pub static SENSORS: [SensorModel; SensorId::COUNT] = [
         number: |p, mm, noise| bridge((mm * p.tread_gain + noise) / p.tread_full_scale_mm),
         scale: |rig| bridge_scale(rig.sense.tread_full_scale_mm),
         faults: (1.2, (0.3, 5.0, "mm", MORE)),
-        reports: &[103, 113, 117, 208, 211, 212],
     },
     SensorModel {
         coding: Coding::Angle,
@@ -114,7 +109,6 @@ pub static SENSORS: [SensorModel; SensorId::COUNT] = [
         number: |p, rad, noise| (rad + p.angle_zero_rad) / TAU * TURN + p.angle_zero_code + noise,
         scale: |rig| (TURN / 360.0, rig.sense.angle_zero_code),
         faults: (1.2, (1.0, 90.0, "deg", MORE)),
-        reports: &[104, 106, 114, 126, 131],
     },
 ];
 

@@ -111,6 +111,13 @@ impl Wall {
         self
     }
 
+    /// The same wall with its steps elsewhere by so much, mm.
+    pub fn moved(&self, by_mm: &[f64]) -> Self {
+        let mut moved = self.clone();
+        moved.steps.iter_mut().zip(by_mm).for_each(|(step, by_mm)| step.position_mm += by_mm);
+        moved
+    }
+
     /// The steps, ascending.
     pub fn steps(&self) -> &[Step] {
         &self.steps

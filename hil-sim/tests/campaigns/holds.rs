@@ -1,6 +1,6 @@
 //! Runs that cannot complete: each holds in the fault that names the cause, bridges off.
 
-use crate::common::{Bench, overridden, starter};
+use crate::common::{Bench, overridden};
 use hil_sim::scenario::Direction;
 use interstage::fault::Fault;
 use interstage::supervise::{Command, Mode};
@@ -10,8 +10,7 @@ fn run(sets: &[&str], direction: Direction) -> Bench {
     let mut scenario = overridden("prototype", sets);
     scenario.run.direction = direction;
     let mut bench = Bench::idle(&scenario);
-    bench.give(starter(direction));
-    bench.finish();
+    bench.go(direction);
     bench
 }
 

@@ -224,8 +224,8 @@ fn ask(planner: &Planner, seed: u64) {
             held: any(),
             felt_at: Some(any()),
             tan_arm: any(),
+            gap_as_table: any(),
             gap: any(),
-            seen: any(),
             trusted: true,
             slipped: true,
         };

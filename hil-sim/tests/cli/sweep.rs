@@ -1,14 +1,13 @@
 //! `rig sweep`.
 
-use super::{good_in, number, object, refused, rig, rig_in, stdout};
+use super::{ends_with, good_in, number, object, refused, rig_in, stdout};
 
 #[test]
 fn a_grid_of_deployments_has_rows_table_and_picture() {
     let directory = tempfile::tempdir().unwrap();
     let at = directory.path();
     let keys = ["--key", "tread.tau_s=0.05..0.2:3", "--key", "run.controller=scheduled,constant"];
-    let output = good_in(at, &[&["sweep", "--json"], &keys[..]].concat());
-    let found = object(&output);
+    let found = object(&good_in(at, &[&["sweep", "--json"], &keys[..]].concat()));
     let rows = found["rows"].as_array().unwrap();
     assert_eq!(rows.len(), 6);
     // A row is the run that deploy makes there.
@@ -57,8 +56,7 @@ fn a_crossing_is_swept_as_it_is_computed_alone() {
         assert_eq!(rows[3][key], alone[key], "{key}");
     }
     // Without keys: gap against speed at cruise preload and at the limit.
-    let arguments = ["sweep", "--crossing", "--method", "fixed", "--json"];
-    let usual = object(&rig_in(at, &arguments));
+    let usual = object(&rig_in(at, &["sweep", "--crossing", "--method", "fixed", "--json"]));
     let rows = usual["rows"].as_array().unwrap();
     assert_eq!(rows.len(), 30);
     let of = |preload: f64| {
@@ -88,8 +86,9 @@ fn what_cannot_be_swept_is_refused_before_anything_runs() {
 }
 
 #[test]
-fn a_run_that_does_not_arrive_has_no_duration() {
-    let rows = object(&rig(&["sweep", "--no-files", "--json", "--key", "plant.mu=0.7,1.1"]));
+fn a_run_that_does_not_arrive_has_no_duration_and_fails_the_sweep() {
+    let arguments = ["sweep", "--no-files", "--json", "--key", "plant.mu=0.7,1.1"];
+    let rows = object(&ends_with(1, ".".as_ref(), &arguments));
     let [slips, arrives] = [0, 1].map(|row| &rows["rows"][row]["duration_s"]);
     assert!(slips.is_null() && arrives.is_f64(), "{rows}");
 }

@@ -165,6 +165,12 @@ impl Bench {
         panic!("no {what} within {within_s} s: {:?}, {:?}", now.seen, now.truth);
     }
 
+    /// Starts in this direction, and runs as [`Bench::finish`].
+    pub(crate) fn go(&mut self, direction: Direction) -> Mode {
+        self.give(starter(direction));
+        self.finish()
+    }
+
     /// Runs until arrival or fault hold, and returns the mode.
     pub(crate) fn finish(&mut self) -> Mode {
         let ended = |now: &Moment| matches!(now.seen.mode, Mode::Complete(_) | Mode::FaultHold(_));

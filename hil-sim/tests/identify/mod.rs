@@ -8,7 +8,6 @@ use std::collections::BTreeMap;
 use crate::cli::{code, good_in, object, refused_in, rig_in, stderr};
 use hidden::Line;
 use hil_sim::identify::published::{self, AMPLITUDE_MM};
-use hil_sim::plant::wall::{Step, Wall};
 use hil_sim::scenario::Scenario;
 use hil_sim::testing::long;
 
@@ -55,8 +54,8 @@ fn a_rig_is_accepted_as_identified_and_not_once_it_has_changed() {
         ("plant.mu", |p| p.mu *= 1.25),
         ("tread.k_inf", |p| (p.ring.k_inf, p.ring.k_0) = (1.2 * p.ring.k_inf, 1.2 * p.ring.k_0)),
         ("tread.k_inf", |p| (p.ring.k_inf, p.ring.k_0) = (0.8 * p.ring.k_inf, 0.8 * p.ring.k_0)),
-        ("rig.step_positions_mm[1]", |p| p.wall = moved(&p.wall, [2.0; 3])),
-        ("rig.step_positions_mm[2]", |p| p.wall = moved(&p.wall, [0.0, 1.0, 0.0])),
+        ("rig.step_positions_mm[1]", |p| p.wall = p.wall.moved(&[2.0; 3])),
+        ("rig.step_positions_mm[2]", |p| p.wall = p.wall.moved(&[0.0, 1.0, 0.0])),
         ("tread.k_inf", |p| p.sensors.preload_sensor_gain *= 1.1),
     ];
     let seeds = if long() { 20 } else { 1 };
@@ -71,11 +70,6 @@ fn a_rig_is_accepted_as_identified_and_not_once_it_has_changed() {
         }
     }
     assert!(20 * refused.len() as u64 <= seeds, "{refused:#?}");
-}
-
-fn moved(wall: &Wall, by_mm: [f64; 3]) -> Wall {
-    let steps = wall.steps().iter().zip(by_mm);
-    Wall::new(steps.map(|(s, by)| Step { position_mm: s.position_mm + by, ..*s }).collect())
 }
 
 /// Least squares of three gaps: better than the presets' tread by the same ring, and the

@@ -2,7 +2,7 @@
 //! ends at the end of travel or in a named fault, and the wheel never loses the wall.
 
 use crate::common::{
-    Bench, DIRECTIONS, NO_SLIP_MM, STEP_CODES, check_each, end_mm, opposite, scenario, starter,
+    Bench, DIRECTIONS, NO_SLIP_MM, STEP_CODES, check_each, end_mm, opposite, scenario,
 };
 use hil_sim::record::{CrossingLine, Summary};
 use hil_sim::scenario::{Direction, Scenario, StepAnomaly};
@@ -211,8 +211,7 @@ fn there_and_back(scenario: &Scenario) -> Bench {
     let direction = scenario.run.direction;
     let mut bench = Bench::idle(scenario);
     for direction in [direction, opposite(direction)] {
-        bench.give(starter(direction));
-        assert_eq!(bench.finish(), Mode::Complete(direction.into()), "{:?}", scenario.run);
+        assert_eq!(bench.go(direction), Mode::Complete(direction.into()), "{:?}", scenario.run);
     }
     bench
 }

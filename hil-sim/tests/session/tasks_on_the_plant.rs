@@ -287,8 +287,7 @@ impl Board {
 /// The same run by the loop of `sil`.
 fn reference(scenario: &Scenario) -> Bench {
     let mut bench = Bench::idle(scenario);
-    bench.give(starter(scenario.run.direction));
-    bench.finish();
+    bench.go(scenario.run.direction);
     bench
 }
 

@@ -39,8 +39,8 @@ fn reviewed_after(wider: f64, trusted: bool, known: &Learned) -> Outcome {
         held: q16(8_000_000),
         felt_at: None,
         tan_arm: q16(1_000_000),
+        gap_as_table: Millimetres::from_num(2.5),
         gap: Millimetres::from_num(2.5),
-        seen: Millimetres::from_num(2.5),
         trusted: false,
         slipped: false,
     };
@@ -49,7 +49,7 @@ fn reviewed_after(wider: f64, trusted: bool, known: &Learned) -> Outcome {
         block_on(planner.review((state, &mut async || ()), review, known))
     };
     let predicted = review_of(&review).gap_predicted;
-    review.gap = predicted + Millimetres::from_num(wider);
+    review.gap_as_table = predicted + Millimetres::from_num(wider);
     review.trusted = trusted;
     review_of(&review)
 }

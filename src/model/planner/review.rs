@@ -31,8 +31,8 @@ const STIFFER: Ratio = q16(1_100_000);
 const LN_STIFFER: Ratio = q16(95_310);
 /// Least relative change of a gap with the logarithm of the stiffness.
 const LEAST_SENSITIVITY: Ratio = q16(100_000);
-/// One sigma of a measured gap against the rolled one, mm: two readings of an arm angle of 0.056 mm
-/// a code make 0.023, a rollout's 0.7 % 0.018, the preload sensor's 1.5 % 0.02.
+/// One sigma of a measured gap against the rolled one, mm: two readings of an arm angle of at most
+/// 0.056 mm a code make 0.023, a rollout's 0.7 % 0.018, the preload sensor's 1.5 % 0.02.
 const MEASURED_WITHIN: Millimetres = q16(36_000);
 /// Largest difference of the logarithm of a stiffness that one crossing may show.
 const MOST_OFF: Ratio = q16(1_000_000);
@@ -150,7 +150,7 @@ impl Planner {
             learned: *known,
             bounded: false,
             strange: false,
-            wide: review.seen > self.gap_ref(review.direction) * WIDE,
+            wide: review.gap > self.gap_ref(review.direction) * WIDE,
         };
         if !review.trusted || !rolled.is_found() {
             return outcome;
@@ -168,7 +168,7 @@ impl Planner {
         // Change of the gap with the logarithm of the stiffness, as a part of it.
         let sensitivity =
             divide(other.gap - rolled.gap, rolled.gap * LN_STIFFER).max(LEAST_SENSITIVITY);
-        let missed = divide(review.gap - rolled.gap, rolled.gap);
+        let missed = divide(review.gap_as_table - rolled.gap, rolled.gap);
         let seen = between(divide(missed, sensitivity), -MOST_OFF, MOST_OFF);
         let error = divide(MEASURED_WITHIN, rolled.gap * sensitivity);
         // Rubber and measurement, three deviations of each.

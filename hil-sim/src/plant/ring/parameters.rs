@@ -41,6 +41,11 @@ impl RingParameters {
         }
     }
 
+    /// Way around the wheel from one element to the next, mm.
+    pub fn pitch_mm(&self) -> f64 {
+        std::f64::consts::TAU * self.radius_mm / self.elements as f64
+    }
+
     /// Whether the elements are coupled.
     pub fn is_coupled(&self) -> bool {
         self.tread_thickness_mm > 0.0

@@ -31,11 +31,14 @@ pub struct Entry {
 const fn codes(target: Target) -> &'static [u16] {
     use Target::*;
     match target {
-        Sensor(sensor) => SENSORS[sensor as usize].reports,
-        EncoderLineA | EncoderLineB => SENSORS[SensorId::WheelEncoder as usize].reports,
-        PreloadSensorConverter => SENSORS[SensorId::PreloadSensor as usize].reports,
-        TreadConverter => SENSORS[SensorId::CompressionSensor as usize].reports,
-        AngleBus | Magnet => SENSORS[SensorId::ArmAngle as usize].reports,
+        Sensor(SensorId::WheelEncoder) | EncoderLineA | EncoderLineB => {
+            &[101, 122, 123, 124, 125, 126, 131]
+        }
+        Sensor(SensorId::PreloadSensor) | PreloadSensorConverter => {
+            &[102, 112, 116, 120, 121, 127, 212]
+        }
+        Sensor(SensorId::CompressionSensor) | TreadConverter => &[103, 113, 117, 208, 211, 212],
+        Sensor(SensorId::ArmAngle) | AngleBus | Magnet => &[104, 106, 114, 126, 131],
         Readback => &[105, 128, 129],
         DriveReadback => &[105, 128],
         PretightenerReadback => &[105, 129],

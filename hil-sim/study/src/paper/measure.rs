@@ -52,8 +52,7 @@ pub fn impact_kpa(plant: &VirtualRig, collision_n: f64) -> f64 {
     let ahead = corner_area_mm2(size, local.ahead_mm, height - local.rise_mm);
     let area = if ahead > 0.0 { ahead } else { corner_area_mm2(size, -local.behind_mm, height) };
     // Elements of the plant's ring touch as a whole.
-    let element = std::f64::consts::TAU * size.0 * size.1 / ring.elements as f64;
-    stress_kpa(collision_n, area.max(element))
+    stress_kpa(collision_n, area.max(ring.pitch_mm() * size.1))
 }
 
 /// Force over area, kPa; 0 where nothing touches.

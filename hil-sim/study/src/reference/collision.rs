@@ -134,8 +134,7 @@ pub fn dynamic(case: &ReferenceCase) -> Result<Crossing, BalanceError> {
 /// The crossing with its time counted from the touch and its areas averaged.
 fn finished(mut samples: Vec<Sample>, touch_s: f64, case: &ReferenceCase) -> Crossing {
     let ring = case.ring();
-    let pitch_mm = std::f64::consts::TAU * ring.radius_mm / ring.elements as f64;
-    let areas = averaged(&samples, pitch_mm);
+    let areas = averaged(&samples, ring.pitch_mm());
     for (sample, area_mm2) in samples.iter_mut().zip(areas) {
         sample.t_s -= touch_s;
         sample.area_mm2 = area_mm2;
