@@ -11,6 +11,7 @@
 
 use heapless::Deque;
 
+use super::schedule::REACHED_PART;
 use crate::model::timing::SLEW_PART;
 use crate::numeric::{LowPass, LowPassState, between, checked};
 use crate::rig::{Rig, RigError};
@@ -49,6 +50,10 @@ pub struct PreloadLoop {
     slew: NewtonsPerSecond,
     /// See [`LEAD`], N.
     lead: Newtons,
+    /// Error that may stand, N: half of that with which the preload is reached.
+    standing: Newtons,
+    /// Ticks for which it does where no step has caused it: twice what the loop takes to answer.
+    stands: u16,
     delay: usize,
     lag: LowPass,
 }
@@ -61,6 +66,10 @@ pub struct PreloadLoopState {
     /// References inside the dead time, the oldest first.
     pipeline: Deque<Newtons, LONGEST_DELAY>,
     model: LowPassState,
+    /// Ticks for which an error has stood.
+    stood: u16,
+    /// Rate that holds what stands, N/s.
+    holding: NewtonsPerSecond,
     running: bool,
 }
 
@@ -77,6 +86,8 @@ impl PreloadLoop {
             most_correction: checked("preload.slew_n_per_s", slew * CORRECTION_PART)?,
             slew: checked("preload.slew_n_per_s", slew)?,
             lead: checked("preload.delay_s", LEAD * slew * rig.preload_latency_s())?,
+            standing: checked("preload.limit_n", rig.preload.limit_n)? * REACHED_PART.half(),
+            stands: (2.0 * answer_s(rig) * f64::from(TICK_HZ)) as u16,
             delay: ticks.min(LONGEST_DELAY - 1),
             lag: LowPass::build(rig.preload.lag_s),
         })
@@ -107,11 +118,16 @@ impl PreloadLoop {
         let _ = state.pipeline.push_back(state.reference);
         let delayed = state.pipeline.pop_front().unwrap_or(state.reference);
         let expected = self.lag.step(&mut state.model, delayed);
-        let correction = between(
-            (expected - measured) * self.correction,
-            -self.most_correction,
-            self.most_correction,
-        );
+        let error = expected - measured;
+        let stands = change == Q16::ZERO && error.abs() > self.standing;
+        state.stood = if stands { state.stood.saturating_add(1) } else { 0 };
+        let most = self.most_correction;
+        if state.stood > self.stands {
+            // Of a screw that sticks, or whose load takes duty to hold: critically damped.
+            let more = per_tick((error * self.correction).half() * self.correction.half());
+            state.holding = between(state.holding + Q16::narrow(more), -most, most);
+        }
+        let correction = between(error * self.correction + state.holding, -most, most);
         Duty::saturating((rate + correction) * self.per_rate)
     }
 }
@@ -152,6 +168,7 @@ impl PreloadLoopState {
             let _ = self.pipeline.push_back(measured);
         }
         self.model = LowPassState::at(measured);
+        (self.stood, self.holding) = (0, Q16::ZERO);
         self.running = true;
     }
 }
@@ -162,8 +179,9 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// Pre-tightener with dead time, lag and slew off by the given factors.
-    fn run(target: f64, delay: f64, lag: f64, slew: f64, seconds: f64) -> Vec<f64> {
+    /// Pre-tightener with dead time, lag and slew off by the given factors, which takes this duty to
+    /// hold its load.
+    fn run(target: f64, [delay, lag, slew]: [f64; 3], holds: f64, seconds: f64) -> Vec<f64> {
         let rig = Rig::prototype();
         let control = PreloadLoop::try_build(&rig).unwrap();
         let mut state = PreloadLoopState::default();
@@ -179,7 +197,8 @@ mod tests {
                     Q16::ZERO,
                 );
                 dead_time.push_back(f64::from(out.to_bits()) / 32768.0);
-                let command = dead_time.pop_front().unwrap() * rig.preload.slew_n_per_s * slew;
+                let duty = dead_time.pop_front().unwrap() - holds;
+                let command = duty * rig.preload.slew_n_per_s * slew;
                 rate += (command - rate) * 1e-3 / (rig.preload.lag_s * lag);
                 force += rate * 1e-3;
                 force
@@ -195,7 +214,7 @@ mod tests {
             lag in 0.6..1.45f64,
             slew in 0.86..1.15f64,
         ) {
-            let force = run(target, delay, lag, slew, 3.0);
+            let force = run(target, [delay, lag, slew], 0.0, 3.0);
             let end = *force.last().unwrap();
             prop_assert!((end - target).abs() < 0.1, "{end}");
             let beyond = force.iter().map(|f| (f - target) * (target - 33.3).signum());
@@ -206,12 +225,25 @@ mod tests {
 
     #[test]
     fn the_nominal_actuator_follows_the_slew_and_stands_in_the_time_allowed() {
-        let force = run(48.0, 1.0, 1.0, 1.0, 2.0);
+        let force = run(48.0, [1.0; 3], 0.0, 2.0);
         let rig = Rig::prototype();
         let timing = crate::model::timing::Timing::try_build(&rig).unwrap();
         let allowed = timing.preload_change(Q16::from_num(48.0 - 33.3)).to_num::<f64>();
         let stands = force.iter().position(|f| *f > 47.5).unwrap() as f64 * 1e-3;
         assert!(stands <= allowed, "{stands} {allowed}");
         assert!(force.iter().all(|f| *f < 48.3));
+    }
+
+    /// A screw whose rate falls with its load would stand 1.5 N short by the correction alone, and
+    /// the wheel would wait for it before a corner.
+    #[test]
+    fn a_screw_that_takes_duty_to_hold_its_load_arrives_without_overshoot() {
+        let reached = Rig::prototype().preload.limit_n * REACHED_PART.to_num::<f64>();
+        for slew in [0.86, 1.0, 1.15] {
+            let force = run(47.8, [1.0, 1.0, slew], 0.18, 6.0);
+            assert!(force[1500] < 47.8 - reached, "{slew} {}", force[1500]);
+            assert!((force[5999] - 47.8).abs() < 0.6 * reached, "{slew} {}", force[5999]);
+            assert!(force.iter().all(|f| *f < 47.8 + 0.2 * reached), "{slew}");
+        }
     }
 }

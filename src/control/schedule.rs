@@ -14,7 +14,7 @@ use crate::units::{
 
 /// Short of the wanted preload by no more than this part of the limit, it is reached:
 /// worth 1.2 % of the gap, less than the schedule's reserve.
-const REACHED_PART: Q16 = q16(20_000);
+pub(super) const REACHED_PART: Q16 = q16(20_000);
 /// Time by which braking starts early, for detection, tick and the loop's lag, s.
 const BRAKE_LAG: Seconds = q16(10_000);
 /// Distance by which braking for the end starts late, mm: the ticks make the profile's braking

@@ -1,5 +1,6 @@
 //! Closes a crossing: its step corrects the position, and it is reported for review.
 
+use super::landing::Landing;
 use super::{EstimateState, Estimator, Findings, OpenCrossing, Position, Slip};
 use crate::fault::{Fault, Limit};
 use crate::sense::SensedState;
@@ -8,6 +9,11 @@ use crate::units::{Direction, Millimetres, Q16, q16};
 /// Deviation of a step's height from which it is reported, mm: three steps of the angle code, and
 /// the tolerance of a sleeve, 0.05.
 const HEIGHT_SEEN: Millimetres = q16(120_000);
+
+/// Largest slide at a landing that may go unseen, mm: the least that counts, and its sigma.
+const UNSEEN: Millimetres = q16(515_000);
+/// What a step that was made with care is off by at most, mm.
+const MACHINED: Millimetres = q16(300_000);
 
 impl Estimator {
     /// Largest residual of a step that is where the table has it, mm: its tolerance, and three
@@ -52,7 +58,12 @@ impl Estimator {
             found.fault.get_or_insert(Fault::StepsDisagree);
             residual
         } else {
-            // One alone: the step is displaced.
+            // One alone: the step is displaced, or as likely slides that went unseen have added up.
+            let unseen = UNSEEN * Q16::from_num(self.steps.count().saturating_sub(step)) + MACHINED;
+            let outwards = state.direction == Direction::Retract && residual > Q16::ZERO;
+            if outwards && residual <= unseen {
+                state.odometry.slip(Q16::ZERO, residual.half());
+            }
             state.displaced = Some((step, residual));
             report_displaced(state, residual, found);
             residual
@@ -80,15 +91,18 @@ impl Estimator {
         if let Some(mut point) = open.lift {
             if !open.resumed && !open.turned {
                 // How low the wall lies that takes a retracting wheel was not known at the lift.
-                let slid = open.landing.filter(|landing| landing.slid > Q16::ZERO);
-                let landing = slid.or_else(|| {
-                    let landing = open.slide.landing()?;
-                    open.slip.lost += landing.slid;
-                    open.landing = Some(landing);
-                    state.odometry.slip(landing.lost, Q16::ZERO);
+                // A slide may follow what looked like the end of one.
+                let known = open.landing.filter(|landing| landing.slid > Q16::ZERO);
+                let more = |last: &Landing| known.is_none_or(|known| last.slid > known.slid);
+                let landing = open.slide.landing().filter(more).inspect(|last| {
+                    let [slid, lost] =
+                        known.map_or([Q16::ZERO; 2], |known| [known.slid, known.lost]);
+                    open.slip.lost += last.slid - slid;
+                    open.landing = Some(*last);
+                    state.odometry.slip(last.lost - lost, Q16::ZERO);
                     state.begin_tick(sensed.travel);
-                    Some(landing)
                 });
+                let landing = landing.or(known);
                 let shift = landing.map_or(measured.shift, |landing| landing.face - point.face);
                 if state.known.is_searching() && open.step > 0 {
                     self.count_down(state, sensed, &mut open);

@@ -380,7 +380,7 @@ mod tests {
             let (sign, rise, now) = signs(direction, beyond);
             assert_eq!(
                 sign,
-                Some((CrossingEvent::Retouched { gap: Q16::ZERO }, 3)),
+                Some((CrossingEvent::Retouched { gap_as_table: Q16::ZERO }, 3)),
                 "{direction:?}"
             );
             // From now on off that wall.
