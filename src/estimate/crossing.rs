@@ -152,6 +152,12 @@ pub enum CrossingEvent {
     },
 }
 
+/// What a tick shows, if anything.
+type Noticed = Option<CrossingEvent>;
+
+/// Direction, sensor values, and how far the wheel is off its baseline, mm.
+type Risen<'a> = (Direction, &'a WatchInput, Millimetres);
+
 /// Sensor values of a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WatchInput {
@@ -314,13 +320,8 @@ impl CrossingWatch {
     }
 
     /// One tick.
-    pub fn step(
-        &self,
-        state: &mut WatchState,
-        direction: Direction,
-        seen: &WatchInput,
-    ) -> Option<CrossingEvent> {
-        let rise = self.rise(state, direction, seen);
+    pub fn step(&self, state: &mut WatchState, direction: Direction, seen: &WatchInput) -> Noticed {
+        let risen = (direction, seen, self.rise(state, direction, seen));
         if state.contact != Contact::Wall {
             state.deepest = state.deepest.max(seen.compression);
             state.eased |= state.deepest - seen.compression > EASES;
@@ -329,19 +330,13 @@ impl CrossingWatch {
             }
         }
         match state.contact {
-            Contact::Wall => self.on_wall(state, direction, seen, rise),
-            Contact::Both | Contact::Corner => self.on_corner(state, direction, seen, rise),
-            Contact::Leaving => self.leave(state, direction, seen, rise),
+            Contact::Wall => self.on_wall(state, risen),
+            Contact::Both | Contact::Corner => self.on_corner(state, risen),
+            Contact::Leaving => self.leave(state, risen),
         }
     }
 
-    fn on_wall(
-        &self,
-        state: &mut WatchState,
-        direction: Direction,
-        seen: &WatchInput,
-        rise: Millimetres,
-    ) -> Option<CrossingEvent> {
+    fn on_wall(&self, state: &mut WatchState, (direction, seen, rise): Risen<'_>) -> Noticed {
         if rise < TOUCH {
             state.ticks = 0;
             let level = rise.abs() < HOLD;
@@ -365,13 +360,7 @@ impl CrossingWatch {
         Some(CrossingEvent::Touched)
     }
 
-    fn on_corner(
-        &self,
-        state: &mut WatchState,
-        direction: Direction,
-        seen: &WatchInput,
-        rise: Millimetres,
-    ) -> Option<CrossingEvent> {
+    fn on_corner(&self, state: &mut WatchState, (direction, seen, rise): Risen<'_>) -> Noticed {
         // Height of the centre that the tread's memory still lacks at this instant.
         let short = match direction {
             Direction::Deploy => {
@@ -419,13 +408,7 @@ impl CrossingWatch {
         None
     }
 
-    fn leave(
-        &self,
-        state: &mut WatchState,
-        direction: Direction,
-        seen: &WatchInput,
-        rise: Millimetres,
-    ) -> Option<CrossingEvent> {
+    fn leave(&self, state: &mut WatchState, (direction, seen, rise): Risen<'_>) -> Noticed {
         let ground = seen.radius - seen.compression;
         // Off the wall that the table promises: the next corner already touches.
         let beyond = rise - self.step;
