@@ -11,7 +11,7 @@ mod search;
 
 use super::approach::Approach;
 use super::guard::Guard;
-use super::plan::{Learned, LimitedBy, Plan, PlanRequest, Strategy};
+use super::plan::{Learned, LimitedBy, Plan, PlanRequest, Review, Strategy};
 use super::profile::Profile;
 use super::timing::Timing;
 use super::tread::{Tread, TreadState};
@@ -189,8 +189,16 @@ impl Planner {
             outcome,
         };
         if request.step > 0 {
+            // A speed at which a tread that is not as known has kept the gap keeps it again.
+            let keeps = |review: &&Review| {
+                [review.direction, request.direction] == [Direction::Retract; 2]
+                    && (review.trusted && learned.unknown)
+                    && review.gap <= self.gap_ref(Direction::Retract)
+            };
+            let review = request.review.as_ref().filter(keeps);
+            let kept = review.map_or(Q16::ZERO, |review| review.held.abs());
             let request = PlanRequest { learned, review: None, ..*request };
-            self.crossing((state, pause), &request, rises_further, &mut plan).await;
+            self.crossing((state, pause), &request, (rises_further, kept), &mut plan).await;
         }
         if self.uniform {
             plan.cruise_speed = plan.cross_speed;
@@ -239,13 +247,13 @@ impl Planner {
         &self,
         (state, pause): (&mut TreadState, &mut impl AsyncFnMut()),
         request: &PlanRequest,
-        rises_further: bool,
+        (rises_further, kept): (bool, MillimetresPerSecond),
         plan: &mut Plan,
     ) {
         let learned = &request.learned;
         let target = self.aimed[request.direction as usize];
         let scene = self.scene(request, plan.cruise_speed);
-        let floor = self.least_speed.min(plan.cruise_speed);
+        let floor = self.least_speed.max(kept).min(plan.cruise_speed);
         // No faster than the pre-tightener can follow the spring over the corner.
         let ceiling = plan.cruise_speed.min(self.climb_speed.max(floor));
         let (floor, ceiling) = match self.prescribed_speed {

@@ -3,7 +3,7 @@
 use super::*;
 use crate::model::history::History;
 use crate::model::plan::KNOWN_DEVIATION;
-use crate::model::plan::{Outcome, Review, Strategy};
+use crate::model::plan::{Outcome, Strategy};
 use crate::rig::Rig;
 use crate::units::q16;
 use proptest::prelude::{any, prop_assert, proptest};
@@ -248,6 +248,32 @@ fn a_search_that_no_speed_suits_is_at_the_safe_speed() {
         assert_eq!(plan.limited_by, LimitedBy::LeastSpeed);
         assert!(plan.limits.contains(&Some(Limit::SpeedFloor)));
     }
+}
+
+#[test]
+fn a_speed_at_which_an_unknown_tread_has_kept_the_gap_is_kept() {
+    let planner = planner();
+    let slowest = |trusted: bool, gap: i64| {
+        let review = Review {
+            direction: Direction::Retract,
+            history: History::steady(25, q16(47_000_000)),
+            distance: q16(12_000_000),
+            held: q16(-5_000_000),
+            felt_at: None,
+            tan_arm: q16(1_000_000),
+            gap_as_table: q16(2_600_000),
+            gap: q16(gap),
+            trusted,
+            slipped: false,
+        };
+        let learned = Learned { scale: q16(1_500_000), unknown: true, ..Learned::default() };
+        let review = Some(review);
+        let request = PlanRequest { learned, review, ..request(Direction::Retract) };
+        planner.plan(&request).approach.slowest_speed
+    };
+    assert_eq!(slowest(true, 2_300_000), q16(5_000_000));
+    // Not where it was wider than the reference, or odd.
+    assert_eq!([slowest(true, 2_400_000), slowest(false, 2_300_000)], [planner.least_speed; 2]);
 }
 
 #[test]
