@@ -20,7 +20,7 @@ use crate::numeric::{between, divide, sqrt};
 use crate::rig::MAX_STEPS;
 use crate::units::{
     Direction, Millimetres, MillimetresPerSecond, Newtons, NewtonsPerSecond, Q16, Ratio, Seconds,
-    q16,
+    q16, ticks_to_seconds,
 };
 use course::{Course, Scene};
 use embassy_futures::block_on;
@@ -189,14 +189,17 @@ impl Planner {
             outcome,
         };
         if request.step > 0 {
-            // A speed at which a tread that is not as known has kept the gap keeps it again.
+            // The speed at which a tread that is not as known has kept the gap keeps it again: that of
+            // its slowest stride.
             let keeps = |review: &&Review| {
                 [review.direction, request.direction] == [Direction::Retract; 2]
                     && (review.trusted && learned.unknown)
                     && review.gap <= self.gap_ref(Direction::Retract)
             };
             let review = request.review.as_ref().filter(keeps);
-            let kept = review.map_or(Q16::ZERO, |review| review.held.abs());
+            let ticks = review.and_then(|review| review.history.strides().map(|s| s.ticks()).max());
+            let kept = ticks
+                .map_or(Q16::ZERO, |ticks| divide(self.tread.stride(), ticks_to_seconds(ticks)));
             let request = PlanRequest { learned, review: None, ..*request };
             self.crossing((state, pause), &request, (rises_further, kept), &mut plan).await;
         }
