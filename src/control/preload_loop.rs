@@ -246,4 +246,17 @@ mod tests {
             assert!(force.iter().all(|f| *f < 47.8 + 0.2 * reached), "{slew}");
         }
     }
+
+    #[test]
+    fn what_held_the_load_of_one_run_is_not_carried_into_the_next() {
+        let control = PreloadLoop::try_build(&Rig::prototype()).unwrap();
+        let mut state = PreloadLoopState::default();
+        let step = |state: &mut PreloadLoopState, measured: i16| {
+            control.step(state, Q16::from_num(48), Q16::from_num(measured), Q16::ZERO)
+        };
+        let held = (0..9000).map(|tick| step(&mut state, if tick == 0 { 48 } else { 46 })).last();
+        state.halt();
+        assert!(held.is_some_and(|held| held != Duty::ZERO));
+        assert_eq!(step(&mut state, 48), Duty::ZERO);
+    }
 }

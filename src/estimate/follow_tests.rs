@@ -1,9 +1,10 @@
 //! Following a crossing: steps found, missed and displaced.
 
 use super::super::close::report_displaced;
+use super::super::landing::Landing;
 use super::super::restore::tests::{estimator, sensed};
 use super::*;
-use crate::units::q16;
+use crate::units::{Travel, q16};
 
 #[test]
 fn the_second_step_missed_in_a_row_is_one_too_many() {
@@ -166,4 +167,27 @@ fn a_step_that_slides_put_out_of_place_leaves_the_place_unsure() {
         assert_eq!((left, found.limits.len()), (q16(residual), 1));
         assert_eq!(estimator.sigma(&state) < q16(500_000), sure, "{direction:?} {step} {residual}");
     }
+}
+
+#[test]
+fn a_slide_behind_what_looked_like_the_end_of_one_is_counted_once() {
+    let (sensed, estimator) = (sensed(0, 0.0, 0.3), estimator());
+    let face = estimator.steps.face(1).expect("a first step");
+    let seen = Landing { face, slid: q16(330_000), lost: q16(300_000) };
+    let lift = Some(LiftPoint { face, ..LiftPoint::default() });
+    let mut open = OpenCrossing { step: 1, landing: Some(seen), lift, ..OpenCrossing::default() };
+    open.slip.lost = seen.slid;
+    // The face moves outwards by 0.9 mm while the tread stands.
+    for fall in [2_000_000, 2_300_000] {
+        let (travel, depth) = (Travel::ZERO, q16(900_000));
+        let at = OnEdge { travel, position: face, fall: q16(fall), depth };
+        let _ = open.slide.step(estimator.watch.radius(), &at);
+    }
+    let all = open.slide.landing().expect("a landing").slid;
+    assert!(all > q16(900_000), "{all:?}");
+    let (direction, crossing) = (Direction::Retract, Some(open));
+    let mut state = EstimateState { direction, crossing, ..EstimateState::default() };
+    let mut found = Findings::default();
+    estimator.close(&mut state, &sensed, &estimator.as_table(Q16::ZERO), &mut found);
+    assert_eq!(found.slip.expect("a slip").amount, all);
 }
