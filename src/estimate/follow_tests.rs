@@ -52,6 +52,7 @@ fn a_corner_is_left_behind_by_its_place_or_in_doubt_by_the_ground() {
 fn a_step_that_sets_the_position_has_its_crossing_there() {
     let (sensed, estimator) = (sensed(0, 0.0, 0.3), estimator());
     let tick = Follow {
+        load: Q16::ZERO,
         now: 0,
         sensed: &sensed,
         pressed: Q16::ZERO,

@@ -19,8 +19,16 @@ const WANDERS: Ratio = q16(30_000);
 const UNKNOWN_RADIUS: Ratio = q16(250_000);
 /// Reciprocal of these 64 mm.
 const PER_REACH: Q16 = q16(15_625);
+/// The same of the part by which the tread gives way otherwise than by its model, per millimetre: 0.6,
+/// of rubber from 4 to 16 mm thick that is told as 8.
+const UNKNOWN_GIVE: Ratio = q16(12_000_000);
+/// The same of how far off the arm then sees a step, as creep and winding up are off by different
+/// parts: 0.12 mm.
+const UNKNOWN_SIGHT: Ratio = q16(480_000);
 /// Largest correction of the travel, relative.
 const MOST_SCALE: Ratio = q16(20_000);
+/// The same of what the tread gives way by.
+const MOST_MORE: Ratio = q16(2_000_000);
 
 /// Largest correction at one step, mm: beyond it the step is not the one expected.
 const LARGEST: Millimetres = q16(2_000_000);
@@ -31,9 +39,9 @@ const CHORD: Millimetres = q16(800_000);
 
 /// Offset of the position from the wheel's travel, and the chord that is not converted yet.
 ///
-/// Offset and scale of the travel are the least-squares estimate from the residuals of the
-/// steps: a Kalman filter with these two states, in units of a step's tolerance and of
-/// 64 mm (Kalman 1960).
+/// What is estimated from the residuals of the steps, by a Kalman filter (Kalman 1960): the offset of
+/// the travel, its scale, the part by which the tread gives way more than by its model, and how
+/// far off the arm sees a step. In units of a step's tolerance, over that of 64 mm, and over that of 1 mm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Odometry {
     offset: Travel,
@@ -41,16 +49,24 @@ pub struct Odometry {
     scale: Ratio,
     /// Position from which the travel counts, mm.
     origin: Millimetres,
-    /// Variances of position and scale, and their covariance.
-    variance: [Ratio; 2],
-    covariance: Ratio,
-    /// Parts of the last residual that position and scale took over.
+    /// Part by which the tread gives way more than by its model.
+    more: Ratio,
+    /// What it gave way by since the origin, by the model, mm.
+    gave: Millimetres,
+    /// How much farther out than it is the arm sees a step, mm.
+    sight: Millimetres,
+    /// Covariance of place, scale, giving way and sight.
+    covariance: [[Ratio; STATES]; STATES],
+    /// Parts of the last residual that the position took over, and each of them.
     share: Ratio,
-    gain: Ratio,
+    gains: [Ratio; STATES],
     from: Option<Start>,
     /// A slip has been taken off it since its origin.
     slipped: bool,
 }
+
+/// Place, scale, giving way and sight.
+const STATES: usize = 4;
 
 impl Default for Odometry {
     fn default() -> Self {
@@ -58,10 +74,12 @@ impl Default for Odometry {
             offset: Travel::ZERO,
             scale: Ratio::ZERO,
             origin: Millimetres::ZERO,
-            variance: [KNOWN, UNKNOWN_RADIUS],
-            covariance: Ratio::ZERO,
+            more: Ratio::ZERO,
+            gave: Millimetres::ZERO,
+            sight: Millimetres::ZERO,
+            covariance: independent([KNOWN, UNKNOWN_RADIUS, UNKNOWN_GIVE, UNKNOWN_SIGHT]),
             share: Ratio::ZERO,
-            gain: Ratio::ZERO,
+            gains: [Ratio::ZERO; STATES],
             from: None,
             slipped: false,
         }
@@ -86,6 +104,13 @@ struct Start {
     radius: Millimetres,
 }
 
+/// A covariance of these variances.
+fn independent(variances: [Ratio; STATES]) -> [[Ratio; STATES]; STATES] {
+    core::array::from_fn(|i| {
+        core::array::from_fn(|j| if i == j { variances[i] } else { Ratio::ZERO })
+    })
+}
+
 impl Odometry {
     /// Position by this travel, mm from the stow end.
     pub fn position(&self, travel: Travel) -> Millimetres {
@@ -95,32 +120,23 @@ impl Odometry {
 
     /// Declares that the wheel is at `position`.
     pub fn set(&mut self, travel: Travel, position: Millimetres) {
-        *self = Self {
-            offset: position.widen().saturating_sub(travel),
-            origin: position,
-            ..Self::default()
-        };
+        let offset = position.widen().saturating_sub(travel);
+        *self = Self { offset, origin: position, ..Self::default() };
     }
 
     /// Declares that the wheel is at `position` because a step was found: as sure as that
     /// step's place.
     pub fn set_by_step(&mut self, travel: Travel, position: Millimetres) {
         self.set(travel, position);
-        self.variance[0] = Ratio::ONE;
+        self.covariance[0][0] = Ratio::ONE;
         self.share = Ratio::ONE;
     }
 
     /// Begins a run at `position`: what moved the arm since the last one was no rolling.
     pub fn begin_run(&mut self, position: Millimetres) {
-        let reach = (position - self.origin) * PER_REACH;
-        let [place, scale] = self.variance;
-        let both = self.covariance + self.covariance + reach * scale;
-        *self = Self {
-            offset: self.offset,
-            origin: position,
-            variance: [between(place + reach * both, KNOWN, Ratio::ONE), UNKNOWN_RADIUS],
-            ..Self::default()
-        };
+        let place = between(self.variance(position), KNOWN, Ratio::ONE);
+        *self = Self { offset: self.offset, origin: position, ..Self::default() };
+        self.covariance[0][0] = place;
     }
 
     /// A slip has been taken off the position since its origin: more of it may hide.
@@ -130,10 +146,35 @@ impl Odometry {
 
     /// One sigma of `position`, mm.
     pub fn sigma(&self, position: Millimetres) -> Millimetres {
+        sqrt(self.variance(position).max(Q16::ZERO)) * PLACE
+    }
+
+    fn variance(&self, position: Millimetres) -> Ratio {
+        self.expect(position, false).1
+    }
+
+    /// Covariance of the states with the position, or with where a step is `seen` there, and its
+    /// variance.
+    fn expect(&self, position: Millimetres, seen: bool) -> ([Ratio; STATES], Ratio) {
         let reach = (position - self.origin) * PER_REACH;
-        let [place, scale] = self.variance;
-        let all = place + reach * (self.covariance + self.covariance + reach * scale);
-        sqrt(all.max(Q16::ZERO)) * PLACE
+        let sight = if seen { Ratio::ONE } else { Ratio::ZERO };
+        let weights = [Ratio::ONE, reach, self.gave, sight];
+        let sum = |row: &[Ratio; STATES]| {
+            row.iter().zip(weights).fold(Q16::ZERO, |sum, (part, weight)| sum + *part * weight)
+        };
+        let with = self.covariance.each_ref().map(sum);
+        (with, sum(&with))
+    }
+
+    /// What the tread gave way by since the origin, by its model, mm.
+    pub(super) const fn gave(&self) -> Millimetres {
+        self.gave
+    }
+
+    /// The tread gives way by so much, mm; by how much as far as the steps show.
+    pub(super) fn give(&mut self, by: Millimetres) -> Millimetres {
+        self.gave += by;
+        by + by * self.more
     }
 
     /// The wheel has slipped: the axle is `lost` further in than the tread's travel has it, give or
@@ -142,26 +183,26 @@ impl Odometry {
         self.offset = self.offset.saturating_sub(lost.widen());
         self.slipped |= lost > Q16::ZERO;
         let parts = sigma * PER_PLACE;
-        self.variance[0] += parts * parts;
+        self.covariance[0][0] += parts * parts;
     }
 
     /// Takes over its part of the difference between where a step was found, near `position`, and
     /// where the table has it, mm; what is left of it.
     pub fn correct(&mut self, position: Millimetres, residual: Millimetres) -> Millimetres {
-        let reach = (position - self.origin) * PER_REACH;
-        let [known, scale] = self.variance;
-        let place = known + WANDERS;
-        let (of_place, of_scale) =
-            (place + reach * self.covariance, self.covariance + reach * scale);
-        let expected = of_place + reach * of_scale;
+        self.covariance[0][0] += WANDERS;
+        let (with, expected) = self.expect(position, true);
         let all = Ratio::ONE + expected;
-        let (gain_of_place, gain) = (divide(of_place, all), divide(of_scale, all));
-        self.variance = [
-            (place - gain_of_place * of_place).max(Q16::ZERO),
-            (scale - gain * of_scale).max(Q16::ZERO),
-        ];
-        self.covariance -= gain_of_place * of_scale;
-        (self.share, self.gain) = (divide(expected, all), gain);
+        self.gains = with.map(|part| divide(part, all));
+        for (row, gain) in self.covariance.iter_mut().zip(self.gains) {
+            for (part, other) in row.iter_mut().zip(with) {
+                *part -= gain * other;
+            }
+        }
+        let reach = (position - self.origin) * PER_REACH;
+        let [place, scale, more, _] = self.gains;
+        // What the arm sees otherwise moves nothing.
+        self.share = place + scale * reach + more * self.gave;
+        let residual = residual - self.sight;
         let most = residual.clamp(-LARGEST, LARGEST);
         residual - most + self.refine(most)
     }
@@ -171,9 +212,12 @@ impl Odometry {
     pub fn refine(&mut self, shift: Millimetres) -> Millimetres {
         let taken = shift * self.share;
         self.offset = self.offset.saturating_sub(taken.widen());
-        let scale = self.scale - shift * self.gain * PER_REACH;
+        let [_, scale, more, sight] = self.gains;
+        self.sight += shift * sight;
+        let scale = self.scale - shift * scale * PER_REACH;
         self.scale = scale.clamp(-MOST_SCALE, MOST_SCALE);
-        shift - taken
+        self.more = (self.more + shift * more).clamp(-MOST_MORE, MOST_MORE);
+        shift - taken - shift * sight
     }
 
     /// Converts what the tread has travelled to axial travel once it makes a chord, or `now`.
@@ -317,7 +361,7 @@ mod tests {
             } else {
                 odometry.set(travel, Q16::from_num(50));
             }
-            let place = odometry.variance[0].to_num::<f64>();
+            let place = odometry.covariance[0][0].to_num::<f64>();
             let rolling = Rolling { radius: Q16::ZERO, lag: Q16::ZERO, on_corner: false };
             odometry.roll(travel, &rolling, true);
             // Every 20 mm of the tread a step; the table has it off by its place, and by how much
@@ -356,7 +400,7 @@ mod tests {
                 let (at, off) = (Q16::from_num(at), Q16::from_num(off));
                 odometry.correct(at, odometry.position(at.widen()) - at - off);
             }
-            least = least.min(odometry.variance[0]);
+            least = least.min(odometry.covariance[0][0]);
         }
         // Never so sure that a step no longer counts, nor off by more than the steps are.
         let off: f64 = odometry.offset.to_num();

@@ -4,7 +4,7 @@ use super::crossing::Contact;
 use super::{EstimateState, Estimator, Findings, OpenCrossing, Position, PositionConfidence};
 use crate::fault::Fault;
 use crate::sense::SensedState;
-use crate::units::{Direction, Millimetres, Q16, Ratio, Tick, q16};
+use crate::units::{Direction, Millimetres, Newtons, Q16, Ratio, Tick, q16};
 
 /// Off a whole number of steps by no more than this, the arm shows a level: half the
 /// hysteresis of a corner, and the tolerances of sleeve and arm.
@@ -23,12 +23,16 @@ impl Estimator {
         sensed: &SensedState,
         now: Tick,
         direction: Direction,
+        load: Newtons,
     ) -> (Findings, bool) {
         let mut found = Findings { advanced: true, replan: true, ..Findings::default() };
         let turned = state.direction != direction;
         state.direction = direction;
         state.leaving = None;
         state.odometry.begin_run(state.position);
+        if state.crossing.is_none() {
+            self.shear.rest(&mut state.wind_up, load);
+        }
         if let Some(open) = state.crossing.as_mut() {
             open.slip.begin_run();
             open.hopeless_since = None;

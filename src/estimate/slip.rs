@@ -10,7 +10,7 @@
 #![deny(clippy::float_arithmetic)]
 
 use super::crossing::HEIGHT_MOST;
-use super::landing::OnEdge;
+use super::landing::{GIVES_OTHERWISE, OnEdge};
 use crate::numeric::{divide, sqrt};
 use crate::units::{Millimetres, Q16, Ratio, Travel, q16};
 
@@ -51,6 +51,8 @@ struct Seen {
 pub struct CornerSlip {
     /// Axial travel by the tread since the edge was first seen, mm.
     rolled: Millimetres,
+    /// The most that the tread has given way by, mm.
+    gave: Millimetres,
     last: Option<Seen>,
     /// Least so far; while the wheel slips the largest.
     mark: Seen,
@@ -77,7 +79,9 @@ impl CornerSlip {
         let face = self.rolled + ahead;
         let slope = divide(over, ahead);
         let misread = divide(over * HEIGHT_MOST + reach * at.depth * MISSED, ahead);
-        let beyond = face - misread - self.rolled * CREEPS;
+        self.gave = self.gave.max(at.gave);
+        let unsure = self.gave * GIVES_OTHERWISE;
+        let beyond = face - misread - self.rolled * CREEPS - unsure - unsure;
         let now = Seen { travel: at.travel, face, beyond };
         let last = self.last.replace(now);
         if last.is_none_or(|last| face - last.face > MOST) {
@@ -151,6 +155,7 @@ mod tests {
             let over = (reach * reach - f64::powi(ahead, 2)).sqrt();
             let jitter = noise * f64::from(tick * 7919 % 101 - 50) / 50.0;
             let at_edge = OnEdge {
+                gave: Q16::ZERO,
                 travel: Travel::from_num(turned),
                 position: Q16::ZERO,
                 fall: Q16::from_num(R - over + error + jitter - missed * DEPTH),
@@ -213,7 +218,8 @@ mod tests {
                 let ahead = 11.0 + 0.01 * f64::from(tick);
                 let fall = Q16::from_num(R - (reach * reach - ahead * ahead).sqrt());
                 let (travel, position) = (Travel::ZERO, Q16::ZERO);
-                let at = OnEdge { travel, position, fall, depth: Q16::from_num(DEPTH) };
+                let depth = Q16::from_num(DEPTH);
+                let at = OnEdge { travel, position, fall, depth, gave: Q16::ZERO };
                 watch.step(Q16::from_num(R), &at, false).to_num::<f64>()
             })
             .sum();

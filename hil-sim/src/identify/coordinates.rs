@@ -152,9 +152,9 @@ pub(crate) const ROWS: [Row; STEPS] = [
         moves: Moves::Sensors,
     },
     Row {
-        shown: ("plant.elastic_creep", "", "creep at the climbs"),
+        shown: ("compliance along the wall over nominal", "", "creep at the climbs"),
         of: ratio,
-        prior: |(plant, _)| known(plant.elastic_creep.ln(), CREEP_REL),
+        prior: |_| known(0.0, CREEP_REL),
         moves: Moves::Rig(0.05),
     },
     Row {
@@ -284,7 +284,7 @@ impl Coordinates {
             },
             wall: Wall::new(steps.collect()),
             mu: x[FRICTION].exp(),
-            elastic_creep: x[CREEP].exp(),
+            wind_up: x[CREEP].exp(),
             load_n: x[LOAD].exp(),
             spring_n_per_mm: 0.0,
             modes: Vec::new(),

@@ -101,7 +101,7 @@ fn the_drives_work_is_found_again_with_a_tread_that_winds_up() {
     ] {
         for compliance in [0.3, 1.0, 2.0] {
             let mut plant = nominal(preset);
-            plant.wind_up = (1.0, compliance);
+            plant.wind_up = compliance;
             let part = missing(finer(plant), speed, preload, 80.0, 3);
             assert!(part.abs() < 3e-3, "{speed} mm/s, {preload} N, {compliance}: {part}");
         }

@@ -8,7 +8,7 @@ use super::bench::{TICK_S, close, drive, ideal, nominal, pairs, roll, steps};
 
 /// The plant with a tread that gives way along the wall, this many times as much as its layer.
 fn wound(mut plant: PlantParameters, compliance: f64) -> PlantParameters {
-    plant.wind_up = (1.0, compliance);
+    plant.wind_up = compliance;
     plant
 }
 
