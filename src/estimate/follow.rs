@@ -116,8 +116,16 @@ impl Estimator {
         };
         let ahead = ahead.unwrap_or_default().max(Q16::ZERO);
         let off = state.watch.contact == Contact::Wall && ahead > Q16::ZERO;
-        let floor =
-            if off { Q16::ZERO } else { self.watch.floor(&state.watch, state.direction, &seen) };
+        // Too far for an edge, on a step that is not as high as the table has it.
+        let beyond = ahead > self.corner().first_contact(Direction::Deploy);
+        let ahead = if beyond { Q16::ZERO } else { ahead };
+        let floor = if off {
+            Q16::ZERO
+        } else if beyond {
+            seen.compression
+        } else {
+            self.watch.floor(&state.watch, state.direction, &seen)
+        };
         Pulled {
             pressed: tick.pressed,
             load: tick.load,
@@ -159,6 +167,10 @@ impl Estimator {
             }
             Expectation::Missing => {
                 found.limit(Limit::StepMissing);
+                if state.extra > 0 {
+                    // Or is it the one that the table lacks, and the wheel elsewhere?
+                    state.odometry.slip(Q16::ZERO, self.steps.tolerance());
+                }
                 state.missed_in_a_row = state.missed_in_a_row.saturating_add(1);
                 state.missed = match state.direction {
                     Direction::Deploy => state.missed.saturating_add(1),

@@ -19,19 +19,15 @@ const WANDERS: Ratio = q16(30_000);
 const UNKNOWN_RADIUS: Ratio = q16(250_000);
 /// Reciprocal of these 64 mm.
 const PER_REACH: Q16 = q16(15_625);
-/// The same of the part by which the tread gives way otherwise than by its model, per millimetre: 0.6,
-/// of rubber from 4 to 16 mm thick that is told as 8.
-const UNKNOWN_GIVE: Ratio = q16(12_000_000);
-/// The same of how far off the arm then sees a step, as creep and winding up are off by different
-/// parts: 0.12 mm.
-const UNKNOWN_SIGHT: Ratio = q16(480_000);
+/// The same of the part by which the tread winds up otherwise than by its model, per millimetre: 0.2,
+/// of a compound and a hub that make it 0.7 to 1.4 times as compliant.
+const UNKNOWN_WINDING: Ratio = q16(1_333_000);
+/// The same of its creep, of the same compliance and of a contact that is 0.25 longer or shorter.
+const UNKNOWN_CREEP: Ratio = q16(2_330_000);
 /// Largest correction of the travel, relative.
 const MOST_SCALE: Ratio = q16(20_000);
-/// The same of what the tread gives way by.
+/// The same of winding up and creep.
 const MOST_MORE: Ratio = q16(2_000_000);
-
-/// Largest correction at one step, mm: beyond it the step is not the one expected.
-const LARGEST: Millimetres = q16(2_000_000);
 
 /// Travel of the tread after which it is converted to axial travel, mm. Shorter, the noise
 /// of the rise would count; longer, the position would lag on a corner.
@@ -40,8 +36,8 @@ const CHORD: Millimetres = q16(800_000);
 /// Offset of the position from the wheel's travel, and the chord that is not converted yet.
 ///
 /// What is estimated from the residuals of the steps, by a Kalman filter (Kalman 1960): the offset of
-/// the travel, its scale, the part by which the tread gives way more than by its model, and how
-/// far off the arm sees a step. In units of a step's tolerance, over that of 64 mm, and over that of 1 mm.
+/// the travel, its scale, and the parts by which the tread creeps and winds up more than by its
+/// model. In units of a step's tolerance, over that of 64 mm, and over that of 1 mm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Odometry {
     offset: Travel,
@@ -49,39 +45,36 @@ pub struct Odometry {
     scale: Ratio,
     /// Position from which the travel counts, mm.
     origin: Millimetres,
-    /// Part by which the tread gives way more than by its model.
-    more: Ratio,
-    /// What it gave way by since the origin, by the model, mm.
-    gave: Millimetres,
-    /// How much farther out than it is the arm sees a step, mm.
-    sight: Millimetres,
-    /// Covariance of place, scale, giving way and sight.
+    /// Parts by which the tread creeps and winds up more than by its model.
+    more: [Ratio; 2],
+    /// By how much it did so since the origin, by the model, mm.
+    gave: [Millimetres; 2],
+    /// Covariance of place, scale, creep and winding up.
     covariance: [[Ratio; STATES]; STATES],
     /// Parts of the last residual that the position took over, and each of them.
     share: Ratio,
     gains: [Ratio; STATES],
     from: Option<Start>,
-    /// A slip has been taken off it since its origin.
-    slipped: bool,
 }
 
-/// Place, scale, giving way and sight.
+/// Place, scale, creep and winding up.
 const STATES: usize = 4;
 
 impl Default for Odometry {
     fn default() -> Self {
+        let mut covariance =
+            independent([KNOWN, UNKNOWN_RADIUS, UNKNOWN_CREEP, UNKNOWN_WINDING]);
+        (covariance[2][3], covariance[3][2]) = (UNKNOWN_WINDING, UNKNOWN_WINDING);
         Self {
             offset: Travel::ZERO,
             scale: Ratio::ZERO,
             origin: Millimetres::ZERO,
-            more: Ratio::ZERO,
-            gave: Millimetres::ZERO,
-            sight: Millimetres::ZERO,
-            covariance: independent([KNOWN, UNKNOWN_RADIUS, UNKNOWN_GIVE, UNKNOWN_SIGHT]),
+            more: [Ratio::ZERO; 2],
+            gave: [Millimetres::ZERO; 2],
+            covariance,
             share: Ratio::ZERO,
             gains: [Ratio::ZERO; STATES],
             from: None,
-            slipped: false,
         }
     }
 }
@@ -139,26 +132,24 @@ impl Odometry {
         self.covariance[0][0] = place;
     }
 
-    /// A slip has been taken off the position since its origin: more of it may hide.
-    pub const fn has_slipped(&self) -> bool {
-        self.slipped
-    }
-
     /// One sigma of `position`, mm.
     pub fn sigma(&self, position: Millimetres) -> Millimetres {
         sqrt(self.variance(position).max(Q16::ZERO)) * PLACE
     }
 
     fn variance(&self, position: Millimetres) -> Ratio {
-        self.expect(position, false).1
+        self.expect(position).1
     }
 
-    /// Covariance of the states with the position, or with where a step is `seen` there, and its
-    /// variance.
-    fn expect(&self, position: Millimetres, seen: bool) -> ([Ratio; STATES], Ratio) {
-        let reach = (position - self.origin) * PER_REACH;
-        let sight = if seen { Ratio::ONE } else { Ratio::ZERO };
-        let weights = [Ratio::ONE, reach, self.gave, sight];
+    /// How the states shift the position.
+    fn weights(&self, position: Millimetres) -> [Ratio; STATES] {
+        let [crept, wound] = self.gave;
+        [Ratio::ONE, (position - self.origin) * PER_REACH, crept, wound]
+    }
+
+    /// Covariance of the states with the position, and its variance.
+    fn expect(&self, position: Millimetres) -> ([Ratio; STATES], Ratio) {
+        let weights = self.weights(position);
         let sum = |row: &[Ratio; STATES]| {
             row.iter().zip(weights).fold(Q16::ZERO, |sum, (part, weight)| sum + *part * weight)
         };
@@ -167,21 +158,21 @@ impl Odometry {
     }
 
     /// What the tread gave way by since the origin, by its model, mm.
-    pub(super) const fn gave(&self) -> Millimetres {
-        self.gave
+    pub(super) fn gave(&self) -> Millimetres {
+        let [crept, wound] = self.gave;
+        crept + wound
     }
 
-    /// The tread gives way by so much, mm; by how much as far as the steps show.
-    pub(super) fn give(&mut self, by: Millimetres) -> Millimetres {
-        self.gave += by;
-        by + by * self.more
+    /// The tread creeps and winds up by so much, mm; by how much as far as the steps show.
+    pub(super) fn give(&mut self, by: [Millimetres; 2]) -> Millimetres {
+        self.gave.iter_mut().zip(by).for_each(|(gave, by)| *gave += by);
+        by.iter().zip(self.more).fold(Q16::ZERO, |all, (by, more)| all + *by + *by * more)
     }
 
     /// The wheel has slipped: the axle is `lost` further in than the tread's travel has it, give or
     /// take `sigma`, mm.
     pub fn slip(&mut self, lost: Millimetres, sigma: Millimetres) {
         self.offset = self.offset.saturating_sub(lost.widen());
-        self.slipped |= lost > Q16::ZERO;
         let parts = sigma * PER_PLACE;
         self.covariance[0][0] += parts * parts;
     }
@@ -190,7 +181,7 @@ impl Odometry {
     /// where the table has it, mm; what is left of it.
     pub fn correct(&mut self, position: Millimetres, residual: Millimetres) -> Millimetres {
         self.covariance[0][0] += WANDERS;
-        let (with, expected) = self.expect(position, true);
+        let (with, expected) = self.expect(position);
         let all = Ratio::ONE + expected;
         self.gains = with.map(|part| divide(part, all));
         for (row, gain) in self.covariance.iter_mut().zip(self.gains) {
@@ -198,13 +189,9 @@ impl Odometry {
                 *part -= gain * other;
             }
         }
-        let reach = (position - self.origin) * PER_REACH;
-        let [place, scale, more, _] = self.gains;
-        // What the arm sees otherwise moves nothing.
-        self.share = place + scale * reach + more * self.gave;
-        let residual = residual - self.sight;
-        let most = residual.clamp(-LARGEST, LARGEST);
-        residual - most + self.refine(most)
+        let by = self.weights(position);
+        self.share = self.gains.iter().zip(by).fold(Q16::ZERO, |all, (gain, by)| all + *gain * by);
+        self.refine(residual)
     }
 
     /// The step found last lies `shift` further out than its residual had it, mm; what is left of
@@ -212,12 +199,13 @@ impl Odometry {
     pub fn refine(&mut self, shift: Millimetres) -> Millimetres {
         let taken = shift * self.share;
         self.offset = self.offset.saturating_sub(taken.widen());
-        let [_, scale, more, sight] = self.gains;
-        self.sight += shift * sight;
+        let [_, scale, more @ ..] = self.gains;
         let scale = self.scale - shift * scale * PER_REACH;
         self.scale = scale.clamp(-MOST_SCALE, MOST_SCALE);
-        self.more = (self.more + shift * more).clamp(-MOST_MORE, MOST_MORE);
-        shift - taken - shift * sight
+        for (part, gain) in self.more.iter_mut().zip(more) {
+            *part = (*part + shift * gain).clamp(-MOST_MORE, MOST_MORE);
+        }
+        shift - taken
     }
 
     /// Converts what the tread has travelled to axial travel once it makes a chord, or `now`.

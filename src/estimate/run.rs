@@ -144,8 +144,6 @@ impl Estimator {
             Direction::Deploy => (self.steps.count() + state.extra).saturating_sub(state.missed),
             Direction::Retract => 0,
         };
-        // Displaced, or is it the wheel: by a slip that was larger than it seemed?
-        let lost = state.displaced.is_some() && state.odometry.has_slipped();
         let on_wall = matches!(state.watch.contact, Contact::Wall | Contact::Leaving);
         // Steps that are not as high as the table has them add up.
         let off = (sensed.steps_up - Q16::from_num(expected)).abs() * self.steps.height();
@@ -153,7 +151,7 @@ impl Estimator {
             sensed.level == expected || off <= self.steps.height().half() + state.raised.abs();
         if !on_wall || !level || state.known.is_searching() {
             Err(Fault::LevelMismatch)
-        } else if state.known.is_unsure() || lost || self.sigma(state) > PLACE_WITHIN {
+        } else if state.known.is_unsure() || self.sigma(state) > PLACE_WITHIN {
             Err(Fault::PlaceUnconfirmed)
         } else {
             Ok(())

@@ -57,6 +57,9 @@ pub struct CornerSlip {
     /// Least so far; while the wheel slips the largest.
     mark: Seen,
     slipping: bool,
+    /// Largest face before the wheel slips, mm: where the axle runs ahead of a tread that lets go of
+    /// the lower wall, the face moves inwards, and back again.
+    outermost: Millimetres,
     /// Noise of the face where it slipped, mm.
     noise: Millimetres,
     /// Slip so far, mm: travel of the tread that moved no axle, or of the axle that no tread made.
@@ -85,21 +88,24 @@ impl CornerSlip {
         let now = Seen { travel: at.travel, face, beyond };
         let last = self.last.replace(now);
         if last.is_none_or(|last| face - last.face > MOST) {
-            (self.mark, self.slipping) = (now, false);
+            (self.mark, self.outermost, self.slipping) = (now, face, false);
             return Q16::ZERO;
         }
         let noise = slope * NOISE;
         let bound = if self.slipping { Q16::ZERO } else { noise };
         let rise = beyond - self.mark.beyond;
-        if rise > bound {
-            let lost = face - self.mark.face;
-            (self.mark, self.slipping) = (now, true);
+        // What the largest misreading leaves of it, or all.
+        let moved = face - self.outermost;
+        if rise > bound && moved > Q16::ZERO {
+            let lost = (moved + rise.min(moved)).half();
+            (self.mark, self.outermost, self.slipping) = (now, face, true);
             self.noise = self.noise.max(noise);
             self.lost += lost;
             return lost;
         }
         if rise < bound - noise {
             (self.mark, self.slipping) = (now, false);
+            self.outermost = self.outermost.max(face);
         }
         Q16::ZERO
     }

@@ -58,8 +58,9 @@ section! {
         /// Part of the force at the tread that drives a mode: its shape there, 1, chosen.
         mode_shape: 1.0, (0.0, 2.0), (0.5, 1.0);
         /// Thickness of the tread as a layer of incompressible rubber, whose elements push each
-        /// other; 0: independent elements, as the controller's model has them.
-        tread_thickness_mm: 0.0, (0.0, 16.0), (4.0, 12.0);
+        /// other, over `tread.thickness_mm`; 0: independent elements, as the controller's model has
+        /// them.
+        tread_thickness: 0.0, (0.0, 2.0), (0.9, 1.1);
         /// Spread s of two relaxations of equal share in place of the one at tau: at tau/s and
         /// tau s.
         second_relaxation: 1.0, (1.0, 10.0), (1.0, 4.0);
@@ -120,7 +121,7 @@ impl RingParameters {
             self.k_0 = self.k_inf * stiffening;
         }
         self.tau_s *= tread_tau;
-        self.tread_thickness_mm = mismatch.tread_thickness_mm;
+        self.tread_thickness_mm = mismatch.tread_thickness * self.layer_mm;
         self.second_relaxation = mismatch.second_relaxation;
         self
     }
