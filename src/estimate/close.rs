@@ -118,6 +118,10 @@ impl Estimator {
                 if let Some(landing) = landing.filter(|landing| landing.slid > Q16::ZERO) {
                     state.odometry.slip(Q16::ZERO, landing.sigma());
                 }
+                if higher.abs() > HEIGHT_SEEN {
+                    // The height moves the face, and is read on a wall that is not there.
+                    state.odometry.slip(Q16::ZERO, shift.half());
+                }
                 point.face += left;
                 point.residual += left;
                 state.begin_tick(sensed.travel);
