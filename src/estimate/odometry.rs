@@ -62,8 +62,7 @@ const STATES: usize = 4;
 
 impl Default for Odometry {
     fn default() -> Self {
-        let mut covariance =
-            independent([KNOWN, UNKNOWN_RADIUS, UNKNOWN_CREEP, UNKNOWN_WINDING]);
+        let mut covariance = independent([KNOWN, UNKNOWN_RADIUS, UNKNOWN_CREEP, UNKNOWN_WINDING]);
         (covariance[2][3], covariance[3][2]) = (UNKNOWN_WINDING, UNKNOWN_WINDING);
         Self {
             offset: Travel::ZERO,
@@ -314,63 +313,76 @@ mod tests {
         assert_eq!(odometry.position(Travel::from_num(5)), Q16::from_num(5));
     }
 
-    /// Position and scale by the inverse of their covariance in f64, which each step at a
-    /// distance adds its residual to.
-    fn least_squares(place: f64, found: &[(f64, f64)]) -> (f64, f64) {
-        let (mut p, mut q, mut r) = (place, 0.0, UNKNOWN_RADIUS.to_num::<f64>());
-        let (mut offset, mut scale) = (0.0, 0.0);
-        for (x, residual) in found {
-            let u = x / 64.0;
-            let p_wandered = p + WANDERS.to_num::<f64>();
-            let det = p_wandered * r - q * q;
-            let (a, b, c) = (r / det + 1.0, -q / det + u, p_wandered / det + u * u);
-            let missing = residual - offset - u * scale;
-            let det = a * c - b * b;
-            offset += (c - b * u) * missing / det;
-            scale += (a * u - b) * missing / det;
-            (p, q, r) = (c / det, -b / det, a / det);
+    /// What is left of the last of these residuals, each with its weights, by Gaussian regression:
+    /// with their covariance S and unit noise, the noise of the last is in `S^-1 y`.
+    fn least_squares(place: f64, found: &[([f64; STATES], f64)]) -> f64 {
+        let prior = Odometry::default().covariance.map(|row| row.map(Q16::to_num::<f64>));
+        let covariance = |i: usize, j: usize| {
+            let mut sum = place - prior[0][0] + WANDERS.to_num::<f64>() * (i.min(j) + 1) as f64;
+            for (a, row) in found[i].0.iter().zip(prior) {
+                sum += found[j].0.iter().zip(row).map(|(b, part)| a * b * part).sum::<f64>();
+            }
+            sum + f64::from(u8::from(i == j))
+        };
+        // Gaussian elimination: the last of its unknowns is all that counts.
+        let count = found.len();
+        let mut rows: Vec<Vec<f64>> = (0..count)
+            .map(|i| (0..count).map(|j| covariance(i, j)).chain([found[i].1]).collect())
+            .collect();
+        for i in 0..count {
+            let pivot = rows[i].clone();
+            for row in &mut rows[i + 1..] {
+                let part = row[i] / pivot[i];
+                row.iter_mut().zip(&pivot).for_each(|(a, b)| *a -= part * b);
+            }
         }
-        (offset, scale / 64.0)
+        rows[count - 1][count] / rows[count - 1][count - 1]
     }
 
     proptest! {
         #[test]
-        fn steps_give_position_and_radius_by_least_squares(
+        fn steps_give_position_radius_and_compliance_by_least_squares(
             back in any::<bool>(),
             by_step in any::<bool>(),
             places in proptest::collection::vec(-0.3..0.3f64, 1..8),
+            gives in proptest::collection::vec([0.0..0.3f64, -0.2..0.7f64], 8),
             stretch in -0.003..0.003f64,
+            more in [-0.4..0.4f64, -0.4..0.4f64],
             shift in -0.1..0.1f64,
         ) {
             let sign = if back { -1.0 } else { 1.0 };
-            let (mut odometry, mut travel) = (Odometry::default(), Travel::ZERO);
+            let (mut odometry, mut turned) = (Odometry::default(), Travel::ZERO);
+            let (mut gave, mut modelled) = (Travel::ZERO, [0.0; 2]);
             if by_step {
-                odometry.set_by_step(travel, Q16::from_num(50));
+                odometry.set_by_step(turned, Q16::from_num(50));
             } else {
-                odometry.set(travel, Q16::from_num(50));
+                odometry.set(turned, Q16::from_num(50));
             }
             let place = odometry.covariance[0][0].to_num::<f64>();
             let rolling = Rolling { radius: Q16::ZERO, lag: Q16::ZERO, on_corner: false };
-            odometry.roll(travel, &rolling, true);
+            odometry.roll(turned, &rolling, true);
             // Every 20 mm of the tread a step; the table has it off by its place, and by how much
-            // farther the tread runs.
+            // farther the tread runs and gives way.
             let mut found = Vec::new();
-            for off in places {
-                let x = sign * 20.0 * (found.len() + 1) as f64;
-                found.push((x, x * stretch + off));
+            for (off, gives) in places.into_iter().zip(gives) {
                 for _ in 0..20 {
-                    travel += Travel::from_num(sign);
-                    odometry.roll(travel, &rolling, true);
+                    turned += Travel::from_num(sign);
+                    gave += odometry.give(gives.map(|by| Q16::from_num(by / 20.0))).widen();
+                    odometry.roll(turned - gave, &rolling, true);
                 }
-                let position = odometry.position(travel);
-                let residual = position - Q16::from_num(50.0 + x - x * stretch - off);
+                modelled = [0, 1].map(|i| modelled[i] + gives[i]);
+                let rolled = turned.to_num::<f64>() - modelled[0] - modelled[1];
+                let extra = rolled * stretch + more[0] * modelled[0] + more[1] * modelled[1] + off;
+                found.push(([1.0, rolled / 64.0, modelled[0], modelled[1]], extra));
+                let position = odometry.position(turned - gave);
+                let at_table = 50.0 + rolled - extra;
+                let residual = position - Q16::from_num(at_table);
                 // Found a little off at first.
                 let shift = Q16::from_num(shift);
                 let left = odometry.correct(position, residual - shift) + odometry.refine(shift);
-                prop_assert!((odometry.position(travel) - position + residual - left).abs() < q16(1_000));
-                let (offset, scale) = least_squares(place, &found);
-                let exact = 50.0 + x - offset - x * scale;
-                let got: f64 = odometry.position(travel).to_num();
+                let got = odometry.position(turned - gave);
+                prop_assert!((got - position + residual - left).abs() < q16(1_000));
+                let (got, exact) = (got.to_num::<f64>(), at_table + least_squares(place, &found));
                 prop_assert!((got - exact).abs() < 0.01, "{got} {exact}");
             }
         }

@@ -300,11 +300,14 @@ mod tests {
 
     #[test]
     fn beyond_friction_it_slides() {
-        let grip = Grip { load_n: 60.0, ..grip() };
+        // Wound up as far as friction goes: it winds no further, and all is creep and slip.
+        let winding = WindUp::steady(&shear(), 1.1 * 33.3, 8.0, 6.0).over(&shear(), 8.0, 6.0, 1e-3);
+        let grip = Grip { load_n: 60.0, winding, ..grip() };
         let (used, ended) = at(&grip, 33.3, 0.0);
         assert!((used - 1.1).abs() < 1e-12);
         assert!((ended.speed - (7.9 + 1.1 * 33.3 - 60.0)).abs() < 1e-9);
-        assert!(grip.slides(&ended, used, 33.3) > 20.0);
+        let slides = 8.0 - ended.speed - 2.0 * 1.1 * 33.3 * winding.creeps;
+        assert!((grip.slides(&ended, used, 33.3) - slides).abs() < 1e-6);
     }
 
     #[test]

@@ -308,7 +308,7 @@ mod tests {
             ("plant.mass_kg", "plant.moved_mass_kg"),
             ("limit", "preload.limit_n"),
             ("friction", "mismatch.friction"),
-            ("plant.tread_thickness_mm", "tread.thickness_mm"),
+            ("plant.tread_thickness_mm", "mismatch.tread_thickness"),
             ("preload.limit", "preload.limit_n"),
             ("cruise_speed", "drive.cruise_speed_mm_s"),
             ("control.cruise_speed_mm_s", "drive.cruise_speed_mm_s"),

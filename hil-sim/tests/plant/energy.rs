@@ -52,7 +52,8 @@ fn the_drives_work_is_found_again_at_any_load_and_speed() {
         ("fe", None, 12.0, 100.0),
         ("fe", None, -30.0, 100.0),
         ("prototype", Some(15.0), 8.0, 45.0),
-        ("prototype", Some(15.0), -8.0, 45.0),
+        // Where friction suffices.
+        ("prototype", Some(15.0), -8.0, 48.0),
     ] {
         let plant = nominal(preset);
         balances(
