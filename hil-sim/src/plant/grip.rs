@@ -306,7 +306,7 @@ mod tests {
         let (used, ended) = at(&grip, 33.3, 0.0);
         assert!((used - 1.1).abs() < 1e-12);
         assert!((ended.speed - (7.9 + 1.1 * 33.3 - 60.0)).abs() < 1e-9);
-        let slides = 8.0 - ended.speed - 2.0 * 1.1 * 33.3 * winding.creeps;
+        let slides = ended.tread - ended.speed - 2.0 * 1.1 * 33.3 * winding.creeps;
         assert!((grip.slides(&ended, used, 33.3) - slides).abs() < 1e-6);
     }
 
