@@ -7,10 +7,8 @@
 //! | [`Record`] | a tick's complete input and output, for the stream |
 //! | [`LogEncoder`] | makes frames of them, below the control rate |
 //! | [`frame`] | layout of a frame |
-//! | [`capture`] | samples around a trigger, kept until they have been read |
 //! | [`ledger`] | one line a crossing |
 
-pub mod capture;
 mod delta;
 mod encoder;
 pub mod frame;

@@ -8,7 +8,6 @@ mod high;
 mod low_pass;
 mod roots;
 mod sine;
-mod table;
 
 pub use build::{checked, cosine_of_turns};
 pub use divide::{Divisor, divide, part, reciprocal_of_normalised};
@@ -17,7 +16,6 @@ pub(crate) use high::horner;
 pub use low_pass::{LowPass, LowPassState};
 pub use roots::sqrt;
 pub use sine::sin_cos;
-pub use table::Table;
 
 /// `value`, but no less than `low` and no more than `high`; `high` if the bounds are reversed,
 /// where [`Ord::clamp`] panics. For bounds from the parameters.

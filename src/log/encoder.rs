@@ -1,6 +1,5 @@
 //! From ticks and entries to frames of the binary log; run by the journal.
 
-use super::capture::Capture;
 use super::frame::{FrameBuffer, Head, Kind, TicksFrame};
 use super::identity::Identity;
 use super::ledger::Ledger;
@@ -25,7 +24,6 @@ pub struct LogEncoder {
     introduced: Option<Tick>,
     sequence: u32,
     dropped: u32,
-    capture: Capture,
     ledger: Ledger,
     ticks: TicksFrame,
     buffer: FrameBuffer,
@@ -39,7 +37,6 @@ impl LogEncoder {
             introduced: None,
             sequence: 0,
             dropped: 0,
-            capture: Capture::new(),
             ledger: Ledger::EMPTY,
             ticks: TicksFrame::new(),
             buffer: FrameBuffer::EMPTY,
@@ -53,7 +50,6 @@ impl LogEncoder {
 
     /// Adds a tick; its frame is sent with the last of [`TICKS_PER_FRAME`].
     pub fn tick(&mut self, record: &Record, send: FrameSink<'_>) {
-        self.capture.look(record, self.identity.corner);
         self.ledger.look(record);
         if !self.ticks.push(record) {
             self.flush(send);
@@ -83,8 +79,7 @@ impl LogEncoder {
         }
     }
 
-    /// Sends the buffered ticks, once a second the identity before them, and a chunk of a
-    /// capture after them.
+    /// Sends the buffered ticks, and once a second the identity before them.
     pub fn flush(&mut self, send: FrameSink<'_>) {
         if self.ticks.ticks() == 0 {
             return;
@@ -98,17 +93,11 @@ impl LogEncoder {
         }
         let room = send(self.ticks.close(self.sequence, self.dropped));
         self.count(room);
-        // A capture uses the room that the ticks leave.
-        if let Some(chunk) = self.capture.chunk()
-            && self.one(Kind::CaptureChunk, &chunk, send)
-        {
-            self.capture.sent(&chunk);
-        }
     }
 
-    /// Sends a frame of one value; returns whether there was room.
+    /// Sends a frame of one value.
     #[inline(never)]
-    fn one(&mut self, kind: Kind, value: &impl Serialize, send: FrameSink<'_>) -> bool {
+    fn one(&mut self, kind: Kind, value: &impl Serialize, send: FrameSink<'_>) {
         let head = Head { kind: kind as u8, sequence: self.sequence, dropped: self.dropped };
         // All values fit, see the test.
         let frame = self
@@ -116,7 +105,6 @@ impl LogEncoder {
             .write(head, |body| postcard::to_slice(value, body).map_or(0, |used| used.len()));
         let room = send(frame);
         self.count(room);
-        room
     }
 
     /// Counts a frame, sent or not.
@@ -129,7 +117,6 @@ impl LogEncoder {
 #[cfg(test)]
 #[allow(clippy::float_arithmetic, reason = "positions of the test")]
 mod tests {
-    use super::super::capture::{CHUNK_SAMPLES, CaptureChunk, CaptureSample, Trigger};
     use super::super::frame::{Body, Frame};
     use super::super::identity;
     use super::super::ledger::tests::crossing;
@@ -137,7 +124,6 @@ mod tests {
     use crate::fault::Limit;
     use crate::model::history::History;
     use crate::model::{Approach, Learned, LimitedBy, Outcome, Plan, PlanRequest, Review};
-    use crate::sense::raw::SensorId;
     use crate::supervise::Mode;
     use crate::tick::CrossingRecord;
 
@@ -338,20 +324,6 @@ mod tests {
             limits: [Some(Limit::SlipMarginLow); 3],
             outcome: Some(outcome),
         };
-        let sample = CaptureSample {
-            at: u16::MAX,
-            codes: [u16::MAX; SensorId::COUNT],
-            duties: [i16::MIN; 2],
-            mode: 255,
-            stage: 255,
-        };
-        let chunk = CaptureChunk {
-            trigger: Trigger::Command,
-            at: u32::MAX,
-            first: 255,
-            of: 255,
-            samples: core::iter::repeat_n(sample, CHUNK_SAMPLES).collect(),
-        };
         let text = "x".repeat(identity::MAX_TEXT);
         let identity = Identity {
             schema: u16::MAX,
@@ -371,7 +343,6 @@ mod tests {
         encoder.entry(&entry, &mut send);
         encoder.one(Kind::Plan, &(u32::MAX, plan), &mut send);
         encoder.one(Kind::Request, &(u32::MAX, request), &mut send);
-        encoder.one(Kind::CaptureChunk, &chunk, &mut send);
         encoder.one(Kind::Identity, &identity, &mut send);
         let mut read =
             frames.frames.iter().map(|bytes| Frame::open(bytes).unwrap().body().unwrap());
@@ -379,7 +350,6 @@ mod tests {
         assert!(matches!(read.next(), Some(Body::Ledger(line)) if line.crossing == crossing));
         assert_eq!(read.next(), Some(Body::Plan(u32::MAX, plan)));
         assert_eq!(read.next(), Some(Body::Request(u32::MAX, request)));
-        assert_eq!(read.next(), Some(Body::CaptureChunk(chunk)));
         assert_eq!(read.next(), Some(Body::Identity(identity)));
     }
 }

@@ -12,7 +12,6 @@
 
 use serde::Deserialize;
 
-use super::capture::CaptureChunk;
 use super::crc32;
 use super::delta::DeltaRecord;
 use super::identity::Identity;
@@ -39,7 +38,7 @@ const CHECK: usize = 4;
 
 const _: () = assert!(BODY.is_multiple_of(4) && HEAD.is_multiple_of(4));
 
-/// Content of a frame; the numbers are stable.
+/// Content of a frame; the numbers are stable. 6 is of older logs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Kind {
@@ -53,17 +52,15 @@ pub enum Kind {
     Request = 4,
     /// A log [`Entry`].
     Event = 5,
-    /// A chunk of a capture: [`CaptureChunk`].
-    CaptureChunk = 6,
     /// A [`Line`] of the crossings' ledger.
     Ledger = 7,
 }
 
 impl Kind {
     /// Every kind.
-    pub const ALL: [Self; 7] = {
-        use Kind::{CaptureChunk, Event, Identity, Ledger, Plan, Request, Ticks};
-        [Identity, Ticks, Plan, Request, Event, CaptureChunk, Ledger]
+    pub const ALL: [Self; 6] = {
+        use Kind::{Event, Identity, Ledger, Plan, Request, Ticks};
+        [Identity, Ticks, Plan, Request, Event, Ledger]
     };
 }
 
@@ -142,8 +139,6 @@ pub enum Body<'a> {
     Request(Tick, PlanRequest),
     /// A log entry.
     Event(Entry),
-    /// A chunk of a capture.
-    CaptureChunk(CaptureChunk),
     /// The ledger line of a crossing.
     Ledger(Line),
     /// A kind that this reader does not know.
@@ -211,7 +206,6 @@ impl<'a> Frame<'a> {
             Kind::Plan => complete(self.body).map(|(at, plan)| Body::Plan(at, plan))?,
             Kind::Request => complete(self.body).map(|(at, request)| Body::Request(at, request))?,
             Kind::Event => Body::Event(complete(self.body)?),
-            Kind::CaptureChunk => Body::CaptureChunk(complete(self.body)?),
             Kind::Ledger => Body::Ledger(complete(self.body)?),
         })
     }

@@ -3,9 +3,9 @@
 
 #![deny(clippy::float_arithmetic)]
 
-use crate::numeric::{Table, checked};
+use crate::numeric::{checked, divide, sqrt};
 use crate::rig::{Rig, RigError};
-use crate::units::{Direction, Millimetres, Q16, Ratio};
+use crate::units::{Direction, Millimetres, Q16, Ratio, q16};
 
 /// Tread depth at the corner, as a part of the step height; it varies little over
 /// the preloads of a crossing.
@@ -16,7 +16,7 @@ const WALL_PART: f64 = 0.08;
 /// Motor force over radial force times the corner's inclination: part of the radial
 /// force comes from traction itself, `1/(cos + u sin)` against `1/cos` at the
 /// utilisation of a crossing.
-const DRIVE_SLOPE_PART: f64 = 0.85;
+const DRIVE_SLOPE_PART: Ratio = q16(850_000);
 
 /// Travel from touch-down until the corner is free, over that from touch to lift-off.
 const BACK_PART: f64 = 0.3;
@@ -28,15 +28,23 @@ const BACK_PART: f64 = 0.3;
 /// distance.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct CornerProfile {
-    slope: Table<97>,
-    /// Tangent of the contact's mean inclination: what the climb costs the motor, per
-    /// radial force. It runs ahead of the rise by the energy that the tread stores.
-    drive_slope: [Table<65>; 2],
+    /// Distance of the centre from an edge that carries, mm.
+    reach: Millimetres,
     /// Distance of first touch, mm.
     touch: Millimetres,
+    /// Distance within which the circle has taken over from the run-in, and its slope there.
+    rolls: Millimetres,
+    at_rolls: Ratio,
+    /// Distance at lift-off, mm.
+    lift: Millimetres,
     /// Half the patch on the continuous wall: distance behind the edge at which it is
     /// clear of it, mm.
     patch: Millimetres,
+    /// Slope of the recovering tread at the face.
+    recovery: Ratio,
+    /// Reciprocals of the run-in, of the circle, of the patch, and of the distances over which the
+    /// corner takes the load over on the way out and back, 1/mm.
+    per: [Q16; 5],
 }
 
 impl CornerProfile {
@@ -49,42 +57,29 @@ impl CornerProfile {
         let low = r - h - wall;
         let touch = libm::sqrt(r * r - low * low).max(rig.corner_reach_mm());
         let patch = 1.4 * libm::sqrt(r * r - (r - wall) * (r - wall));
-        // Lift-off, and where the circle has taken over from the run-in.
         let lift = libm::sqrt((reach * reach - (r - h) * (r - h)).max(0.01));
         let rolls = 0.93 * lift;
-        let on_corner = |d: f64| if d > 0.0 { d / libm::sqrt(reach * reach - d * d) } else { 0.0 };
-        let most = 2.0 * (corner - wall) / (rolls + patch);
-        let recovery = |d: f64| {
-            let part = if d > 0.0 { 1.0 - d / rolls } else { 1.0 + d / patch };
-            most * part.max(0.0)
-        };
-        let high = RigError::OutOfRange { key: "rig.step_height_mm", value: h, min: 0.5, max: 8.0 };
-        let slope = Table::build(-patch, touch, |d| {
-            if d <= rolls {
-                on_corner(d) + recovery(d)
-            } else {
-                let part = (touch - d) / (touch - rolls);
-                on_corner(rolls) * part * part
-            }
-        })
-        .ok_or(high)?;
-        // The load passes from wall to corner between first touch and lift-off. Back it passes
-        // within a few tenths of that travel: the relaxed tread is still deep at the corner.
-        let drive_slope = |ends: f64| {
-            Table::build(0.0, touch, |d| {
-                let full = DRIVE_SLOPE_PART * on_corner(d.min(lift));
-                let part = ((ends - d) / (ends - lift)).clamp(0.0, 1.0);
-                full * part
-            })
-            .ok_or(high)
-        };
-        let back = lift + BACK_PART * (touch - lift);
+        let number = |value: f64| checked("rig.step_height_mm", value);
+        let mut per = [Q16::ZERO; 5];
+        let back = BACK_PART * (touch - lift);
+        for (per, of) in per.iter_mut().zip([touch - rolls, rolls, patch, touch - lift, back]) {
+            *per = number(1.0 / of)?;
+        }
         Ok(Self {
-            slope,
-            drive_slope: [drive_slope(touch)?, drive_slope(back)?],
-            touch: checked("rig.step_height_mm", touch)?,
-            patch: checked("rig.wheel_radius_mm", patch)?,
+            reach: number(reach)?,
+            touch: number(touch)?,
+            rolls: number(rolls)?,
+            at_rolls: number(rolls / libm::sqrt(reach * reach - rolls * rolls))?,
+            lift: number(lift)?,
+            patch: number(patch)?,
+            recovery: number(2.0 * (corner - wall) / (rolls + patch))?,
+            per,
         })
+    }
+
+    /// Slope of a circle that rolls about an edge at this distance ahead.
+    fn on_edge(&self, ahead: Millimetres) -> Ratio {
+        divide(ahead, sqrt(self.reach * self.reach - ahead * ahead))
     }
 
     /// Distance to the face at which the corner may first touch in this direction, mm.
@@ -103,20 +98,34 @@ impl CornerProfile {
     /// Motor force per radial force that a corner `ahead` mm outwards of the centre
     /// costs; zero away from it.
     pub fn drive_slope(&self, direction: Direction, ahead: Millimetres) -> Ratio {
-        let [out, back] = &self.drive_slope;
         if ahead <= Q16::ZERO || ahead >= self.touch {
             return Q16::ZERO;
         }
-        match direction {
-            Direction::Deploy => out.eval(ahead),
-            Direction::Retract => back.eval(ahead),
-        }
+        // The load passes from wall to corner between first touch and lift-off. Back it passes
+        // within a few tenths of that travel: the relaxed tread is still deep at the corner.
+        let [.., out, back] = self.per;
+        let per = match direction {
+            Direction::Deploy => out,
+            Direction::Retract => back,
+        };
+        let part = Ratio::ONE - (ahead - self.lift).max(Q16::ZERO) * per;
+        self.on_edge(ahead.min(self.lift)) * DRIVE_SLOPE_PART * part.max(Ratio::ZERO)
     }
 
     /// Rise per axial travel outwards with the face `ahead` mm outwards of the centre,
     /// negative behind the edge; zero away from a corner.
     pub fn slope(&self, ahead: Millimetres) -> Ratio {
-        if ahead <= -self.patch || ahead >= self.touch { Q16::ZERO } else { self.slope.eval(ahead) }
+        let [run_in, circle, patch, ..] = self.per;
+        if ahead <= -self.patch || ahead >= self.touch {
+            Q16::ZERO
+        } else if ahead > self.rolls {
+            let part = (self.touch - ahead) * run_in;
+            self.at_rolls * part * part
+        } else if ahead > Q16::ZERO {
+            self.on_edge(ahead) + self.recovery * (Ratio::ONE - ahead * circle)
+        } else {
+            self.recovery * (Ratio::ONE + ahead * patch)
+        }
     }
 }
 

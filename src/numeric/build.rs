@@ -1,7 +1,7 @@
 //! From SI numbers to machine units: the only floats of this module, used once
 //! at start.
 
-use super::{Divisor, LowPass, Table};
+use super::{Divisor, LowPass};
 use crate::rig::RigError;
 use crate::units::{Q16, TICK_HZ};
 use fixed::types::I16F16;
@@ -28,26 +28,6 @@ pub fn cosine_of_turns(turns: f64) -> f64 {
         sum += term;
     }
     sum
-}
-
-impl<const N: usize> Table<N> {
-    /// Samples `f` at N points evenly from `lo` to `hi`.
-    ///
-    /// `None` if the range is empty or not representable, if a sample is not, or
-    /// if `f` bends so hard between the points that the interpolation could
-    /// overflow.
-    pub fn build(lo: f64, hi: f64, f: impl Fn(f64) -> f64) -> Option<Self> {
-        let (lo, hi) = (I16F16::checked_from_num(lo)?, I16F16::checked_from_num(hi)?);
-        // From the rounded ends, so that samples are where they are looked up.
-        let (start, end) = (lo.to_num::<f64>(), hi.to_num::<f64>());
-        let last = N.checked_sub(1)? as f64;
-        let mut samples = [0; N];
-        for (index, sample) in samples.iter_mut().enumerate() {
-            let x = start + (end - start) * (index as f64 / last);
-            *sample = I16F16::checked_from_num(f(x))?.to_bits();
-        }
-        Self::from_bits(lo.to_bits(), hi.to_bits(), samples)
-    }
 }
 
 impl Divisor {
@@ -94,17 +74,5 @@ mod tests {
             let error = checked("a.b", value).expect_err("refused");
             assert!(matches!(error, RigError::OutOfRange { key: "a.b", .. }));
         }
-    }
-
-    #[test]
-    fn a_table_that_cannot_be_is_refused() {
-        assert!(Table::<8>::build(0.0, 1.0, |x| x).is_some());
-        assert!(Table::<8>::build(1.0, 1.0, |x| x).is_none(), "empty range");
-        assert!(Table::<8>::build(0.0, 1e6, |x| x).is_none(), "range not representable");
-        assert!(Table::<8>::build(0.0, 1.0, |x| 1e6 * x).is_none(), "samples not representable");
-        assert!(Table::<8>::build(0.0, 1.0, |x| 1.0 / (x - x)).is_none(), "not finite");
-        assert!(Table::<3>::build(0.0, 1.0, |x| x).is_none(), "too few points");
-        let zigzag = |x: f64| if libm::round(7.0 * x) as i32 % 2 == 0 { 3e4 } else { -3e4 };
-        assert!(Table::<8>::build(0.0, 1.0, zigzag).is_none(), "bends too hard");
     }
 }

@@ -4,7 +4,6 @@
 //! frame. A target has restarted if its sequence or its clock goes back.
 
 use crate::table::counted;
-use interstage::log::capture::CaptureChunk;
 use interstage::log::frame::{Body, Found, Frame, find};
 use interstage::log::identity::SCHEMA;
 use interstage::log::ledger::Line;
@@ -25,8 +24,6 @@ pub enum Item {
     /// A request for a plan that this tick made.
     Request(u32, PlanRequest),
     Event(Entry),
-    /// A part of a capture.
-    CaptureChunk(CaptureChunk),
     Ledger(Line),
     /// Something is missing here.
     Mark(Mark),
@@ -227,7 +224,6 @@ impl Decoder {
             Body::Plan(at, plan) => take(Item::Plan(at, plan)),
             Body::Request(at, request) => take(Item::Request(at, request)),
             Body::Event(entry) => take(Item::Event(entry)),
-            Body::CaptureChunk(chunk) => take(Item::CaptureChunk(chunk)),
             Body::Ledger(line) => take(Item::Ledger(line)),
             Body::Unknown => {}
         }

@@ -132,7 +132,7 @@ pub fn messages(item: &Item) -> Option<(Topic, Vec<u8>)> {
             body(Topic::Log, &log_message(ns, level(entry), &text(&entry.event)))
         }
         Item::Mark(mark) => body(Topic::Log, &log_message(0, WARNING, &mark.to_string())),
-        Item::Identity(_) | Item::Plan(..) | Item::Request(..) | Item::CaptureChunk(_) => None,
+        Item::Identity(_) | Item::Plan(..) | Item::Request(..) => None,
     }
 }
 

@@ -1,7 +1,6 @@
 //! A log in memory.
 
 use interstage::log::Identity;
-use interstage::log::capture::CaptureChunk;
 use interstage::log::identity::fingerprint;
 use interstage::log::ledger::Line;
 use interstage::model::{Plan, PlanRequest};
@@ -142,8 +141,6 @@ pub struct Run {
     /// Requests with the ticks that made them.
     pub requests: Vec<(u32, PlanRequest)>,
     pub ledger: Vec<Line>,
-    /// Parts of captures.
-    pub captures: Vec<CaptureChunk>,
     /// Each start after the first.
     pub boots: Vec<Boot>,
     /// Marks with the row that each precedes.
@@ -207,7 +204,6 @@ impl Run {
             Item::Plan(at, plan) => self.plans.push((*at, *plan)),
             Item::Request(at, request) => self.requests.push((*at, *request)),
             Item::Event(entry) => self.events.push(*entry),
-            Item::CaptureChunk(chunk) => self.captures.push(chunk.clone()),
             Item::Ledger(line) => self.ledger.push(*line),
             Item::Mark(mark) => {
                 if *mark == Mark::Restart {

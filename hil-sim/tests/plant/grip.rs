@@ -6,7 +6,7 @@ use hil_sim::scenario::Scenario;
 use hil_sim::session::{Options, run};
 use interstage::fault::Fault;
 
-use crate::common::overridden;
+use crate::common::{NO_SLIP_MM, overridden};
 
 use super::bench::{TICK_S, close, deploy, drive, ideal, nominal, roll, steps};
 
@@ -102,7 +102,7 @@ fn the_whole_load_stops_a_run_unless_the_arm_helps() {
         assert!(reasons.into_iter().any(named), "{coupling}: {stuck:?}");
     }
     let helped = summary("plant.arm_coupling=1");
-    assert!(helped.completed && helped.slip_mm == 0.0, "{helped:?}");
+    assert!(helped.completed && helped.slip_mm < NO_SLIP_MM, "{helped:?}");
     let most = helped.crossings.iter().map(|c| c.peak_utilisation).fold(0.0, f64::max);
     assert!((1.0..1.1).contains(&most), "{most}");
 }
