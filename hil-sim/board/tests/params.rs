@@ -135,10 +135,11 @@ fn checksum(bytes: &[u8]) -> u32 {
 fn old_set(name: &str, rig: &Rig) -> Vec<u8> {
     let mut set = set_of(name, rig).expect("a sound rig");
     assert_eq!(set[0], SCHEMA as u8, "its number is first");
+    let rig_ends = usize::from(ParameterSet::open(&set).expect("a set").header().rig_length);
     set[0] -= 1;
     set.truncate(set.len() - 4 - 200);
-    let end = set.len();
-    for byte in &mut set[end - 500..] {
+    // Behind the header and the rig.
+    for byte in &mut set[rig_ends + 100..] {
         *byte = byte.wrapping_mul(3).wrapping_add(1);
     }
     set.extend(checksum(&set).to_le_bytes());

@@ -5,6 +5,7 @@ use hil_sim::faults::campaign::{Case, FaultCampaign, MatrixRow, Outcome, twin, w
 use hil_sim::scenario::Scenario;
 use hil_sim::scenario::injection::{Injection, Kind, Target};
 use hil_sim::session::{Options, run};
+use hil_sim::testing::long;
 use interstage::sense::raw::SensorId;
 
 fn campaign_on(scenario: Scenario, instants: usize, wanted: impl Fn(&str) -> bool) -> Outcome {
@@ -44,7 +45,7 @@ fn urgent_faults_are_found_at_once() {
 
 #[test]
 fn a_bridge_that_regulates_its_current_is_no_fault_of_the_bridge() {
-    let outcome = campaign(200, |name| name.ends_with("regulating"));
+    let outcome = campaign(if long() { 200 } else { 40 }, |name| name.ends_with("regulating"));
     assert_eq!((outcome.undetected, outcome.unheld), (0, 0), "{outcome:#?}");
     assert_eq!(outcome.matrix.len(), 2);
     for line in &outcome.matrix {
@@ -150,8 +151,8 @@ fn slow(travel_mm: u32) -> Scenario {
 fn a_long_travel_at_a_low_speed_is_given_its_time() {
     // 200 s, and 60 s each way.
     let steps = ["rig.step_positions_mm=[200, 500, 800]".to_owned()];
-    let long = slow(1000).with(&steps).expect("in range");
-    let summary = run(&long, Options::default()).expect("a run").summary;
+    let slowly = slow(1000).with(&steps).expect("in range");
+    let summary = run(&slowly, Options::default()).expect("a run").summary;
     assert!(summary.completed && summary.duration_s > Some(190.0), "{summary:?}");
     let outcome = campaign_on(slow(300), 1, |name| name == "log gone");
     assert_eq!((outcome.undetected, outcome.unheld), (0, 0), "{outcome:#?}");

@@ -160,10 +160,10 @@ fn halves(at: &Path, command: &[&str]) -> [Output; 2] {
 #[test]
 fn merged_parts_are_what_one_machine_prints_to_the_bit() {
     for command in [
-        "montecarlo -n 20 --seed 7 --wide",
+        "montecarlo -n 8 --seed 7 --wide",
         "faults -n 2 --only runaway --only tick",
         "faults --clean 3",
-        "stress --cases 40",
+        "stress --cases 16",
         "envelope -n 2x2 --no-files",
         "sweep --no-files --crossing --method fixed --key speed_mm_s=5,8,9",
         "compare -n 1 --no-oracle",

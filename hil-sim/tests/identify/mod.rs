@@ -13,7 +13,7 @@ use hil_sim::testing::long;
 
 #[test]
 fn hidden_parameters_lie_within_their_intervals() {
-    let cases = if long() { 100 } else { 10 };
+    let cases = if long() { 100 } else { 4 };
     let mut lines = BTreeMap::<String, Line>::new();
     // The intervals were widened by the rigs of seeds 1 to 10.
     for seed in 11..=10 + cases {
@@ -24,7 +24,7 @@ fn hidden_parameters_lie_within_their_intervals() {
     for (name, line) in &lines {
         // Two of a hundred rigs have a run that does not start.
         assert!(line.identified + cases as usize / 20 >= cases as usize, "{name}: {line:?}");
-        // Of ten at 95 %, fewer than seven is one in a thousand.
+        // Of ten at 95 %, fewer than seven is one in a thousand; of four, fewer than three in seventy.
         assert!(10 * line.within >= 7 * line.identified, "{name}: {line:?}");
         within += line.within;
         all += line.identified;
@@ -51,17 +51,17 @@ fn a_rig_is_accepted_as_identified_and_not_once_it_has_changed() {
     let changes: [hidden::Change; 8] = [
         ("", |_| ()),
         ("plant.mu", |p| p.mu *= 0.75),
+        ("rig.step_positions_mm[2]", |p| p.wall = p.wall.moved(&[0.0, 1.0, 0.0])),
+        ("tread.k_inf", |p| p.sensors.preload_sensor_gain *= 1.1),
         ("plant.mu", |p| p.mu *= 1.25),
         ("tread.k_inf", |p| (p.ring.k_inf, p.ring.k_0) = (1.2 * p.ring.k_inf, 1.2 * p.ring.k_0)),
         ("tread.k_inf", |p| (p.ring.k_inf, p.ring.k_0) = (0.8 * p.ring.k_inf, 0.8 * p.ring.k_0)),
         ("rig.step_positions_mm[1]", |p| p.wall = p.wall.moved(&[2.0; 3])),
-        ("rig.step_positions_mm[2]", |p| p.wall = p.wall.moved(&[0.0, 1.0, 0.0])),
-        ("tread.k_inf", |p| p.sensors.preload_sensor_gain *= 1.1),
     ];
-    let seeds = if long() { 20 } else { 1 };
+    let (seeds, changes) = if long() { (20, &changes[..]) } else { (1, &changes[..4]) };
     let mut refused = Vec::new();
     for seed in 1_700_001..=1_700_000 + seeds {
-        let mut reasons = hidden::accepted(seed, &changes).into_iter();
+        let mut reasons = hidden::accepted(seed, changes).into_iter();
         refused.extend(reasons.next().filter(|why| !why.is_empty()));
         for ((name, _), why) in changes.iter().skip(1).zip(reasons) {
             // Friction may show as slip, load or tread.
