@@ -144,7 +144,49 @@ mod tests {
         assert!((height - 4.0).abs() < 0.2, "{height}");
     }
 
+    /// The shape that the type describes, in f64: slope, and the drive's part out and back.
+    fn exact(rig: &Rig, d: f64) -> [f64; 3] {
+        let (r, h) = (rig.rig.wheel_radius_mm, rig.rig.step_height_mm);
+        let (reach, wall) = (r - 0.28 * h, 0.08 * h);
+        let touch = (r * r - (r - h - wall).powi(2)).sqrt().max(rig.corner_reach_mm());
+        let patch = 1.4 * (r * r - (r - wall).powi(2)).sqrt();
+        let lift = (reach * reach - (r - h).powi(2)).max(0.01).sqrt();
+        let rolls = 0.93 * lift;
+        let circle = |d: f64| (d / reach).asin().tan();
+        let recovers = |part: f64| 0.4 * h / (rolls + patch) * part;
+        let slope = match d {
+            d if d <= -patch || d >= touch => 0.0,
+            d if d <= 0.0 => recovers(1.0 + d / patch),
+            d if d <= rolls => circle(d) + recovers(1.0 - d / rolls),
+            d => circle(rolls) * ((touch - d) / (touch - rolls)).powi(2),
+        };
+        let drive = |over: f64| match d {
+            d if d <= 0.0 || d >= touch => 0.0,
+            d => 0.85 * circle(d.min(lift)) * (1.0 - (d - lift).max(0.0) / over).max(0.0),
+        };
+        [slope, drive(touch - lift), drive(0.3 * (touch - lift))]
+    }
+
     proptest::proptest! {
+        #[test]
+        fn slopes_have_the_shape_that_is_described(
+            radius in 15.0..60.0f64, height in 2.0..6.0f64, ahead in -10.0..30.0f64,
+        ) {
+            let mut rig = Rig::prototype();
+            (rig.rig.wheel_radius_mm, rig.rig.step_height_mm) = (radius, height);
+            let corner = CornerProfile::try_build(&rig).unwrap();
+            let at = Q16::from_num(ahead);
+            let back = corner.drive_slope(Direction::Retract, at);
+            let found = [corner.slope(at), corner.drive_slope(Direction::Deploy, at), back];
+            // At an end of the range the rounded distance may lie on the other side.
+            let [low, high] = [-1e-3, 1e-3].map(|by| exact(&rig, ahead + by));
+            for ((found, low), high) in found.into_iter().zip(low).zip(high) {
+                let found: f64 = found.to_num();
+                let within = low.min(high) - 1e-3..=low.max(high) + 1e-3;
+                proptest::prop_assert!(within.contains(&found), "{found} {within:?}");
+            }
+        }
+
         #[test]
         fn slopes_are_those_of_a_wheel_whatever_the_distance(bits in proptest::prelude::any::<i32>()) {
             let corner = CornerProfile::try_build(&Rig::prototype()).unwrap();
