@@ -304,12 +304,7 @@ impl CrossingWatch {
     /// Distance from a face at which an undeformed wheel on this ground touches its edge, mm, over the
     /// wall above: `sqrt(R^2 - (R - f)^2)`.
     pub fn reach(&self, state: &WatchState, ground: Millimetres) -> Millimetres {
-        self.reaches(ground - state.baseline.output() - self.step)
-    }
-
-    /// The same of a step above a wall that compresses the wheel by so much, mm.
-    pub fn reaches(&self, compression: Millimetres) -> Millimetres {
-        let fallen = between(self.step + compression, Q16::ZERO, self.step + HEIGHT_MOST);
+        let fallen = between(ground - state.baseline.output(), Q16::ZERO, self.step + HEIGHT_MOST);
         sqrt(fallen * (self.radius + self.radius - fallen))
     }
 

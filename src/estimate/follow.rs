@@ -110,21 +110,18 @@ impl Estimator {
                 let face = open.lift.map(|point| point.face).or(open.felt);
                 face.or(self.steps.face(open.step)).map(|face| face - state.position)
             }
-            // A wheel is on an edge before that shows.
-            None => self.distance(state).map(|distance| match state.direction {
-                Direction::Deploy => distance,
-                Direction::Retract => -distance,
-            }),
+            // A wheel that goes over an edge is on it before that shows.
+            None if state.direction == Direction::Retract => self.distance(state).map(|d| -d),
+            None => None,
         };
         let ahead = ahead.unwrap_or_default().max(Q16::ZERO);
-        let retract = state.direction == Direction::Retract;
-        let off = retract && state.watch.contact == Contact::Wall && ahead > Q16::ZERO;
+        let off = state.watch.contact == Contact::Wall && ahead > Q16::ZERO;
         // Too far for an edge, on a step that is not as high as the table has it.
-        let beyond = ahead > self.watch.reaches(seen.compression);
+        let beyond = ahead > self.corner().first_contact(Direction::Deploy);
         let ahead = if beyond { Q16::ZERO } else { ahead };
         let floor = if off {
             Q16::ZERO
-        } else if ahead == Q16::ZERO {
+        } else if beyond {
             seen.compression
         } else {
             self.watch.floor(&state.watch, state.direction, &seen)
@@ -135,7 +132,7 @@ impl Estimator {
             depth: seen.compression,
             ahead,
             floor,
-            level: ahead == Q16::ZERO && self.watch.is_level(&state.watch, state.direction, &seen),
+            level: !off && self.watch.is_level(&state.watch, state.direction, &seen),
         }
     }
 

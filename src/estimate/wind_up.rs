@@ -72,9 +72,9 @@ impl Pulls {
             let gave = relaxed.displaced() - state.winding.displaced();
             state.spread.gave += gave.widen();
         }
-        let Winding { floor, settled, .. } = state.winding;
+        let floor = state.winding.floor;
         state.winding = relaxed;
-        (state.winding.floor, state.winding.settled) = (floor, settled);
+        state.winding.floor = floor;
     }
 
     /// A tick at this travel of the tread, less what it gave way by.
@@ -93,7 +93,7 @@ impl Pulls {
         }
         state.ticks = 0;
         let from = core::mem::replace(&mut state.from, travel);
-        let sinks = pulled.floor - state.winding.settled;
+        let sinks = pulled.floor - state.winding.floor;
         let presses = (pulled.floor + sinks * self.shear.stiffens()).max(Q16::ZERO);
         let to_load = sqrt(presses) * presses;
         if pulled.level {

@@ -59,11 +59,8 @@ pub struct Pull {
 pub struct Winding {
     displaced: Millimetres,
     memory: Millimetres,
-    /// What the freshest tread remembers of its compression by the lower wall, mm, and what all of it
-    /// does.
+    /// What the tread remembers of its compression by the lower wall, mm.
     pub floor: Millimetres,
-    /// See `floor`.
-    pub settled: Millimetres,
 }
 
 /// What gives way, spread over so much time that a drive which makes up for it does not jolt.
@@ -148,10 +145,7 @@ impl Shear {
         let creeps = divide(pulls * renewed, self.relaxation_lengths * rolling * carter);
         let winds = displaced - state.displaced;
         let floor = follows * pull.floor + divide(state.floor, all);
-        // Where rubber comes in as it leaves, the forces are those of rubber that has relaxed.
-        let carries = relaxes + renewed;
-        let settled = divide(state.settled + carries * pull.floor, all);
-        *state = Winding { displaced, memory: follows * displaced + kept, floor, settled };
+        *state = Winding { displaced, memory: follows * displaced + kept, floor };
         [creeps, winds]
     }
 }

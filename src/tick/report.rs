@@ -134,7 +134,7 @@ impl Controller {
             gap_predicted: plan.map_or(Q16::ZERO, |plan| plan.gap),
             slip_margin: if crossing { planned.min(rolling) } else { rolling },
             vibration: state.vibration.peak(),
-            distance: self.estimator.felt(&state.estimate).or_else(|| self.estimator.distance(&state.estimate)).unwrap_or(Q16::MAX),
+            distance: self.estimator.distance(&state.estimate).unwrap_or(Q16::MAX),
             drive: tick.output.drive.duty,
             pretightener: tick.output.preload.duty,
         }
