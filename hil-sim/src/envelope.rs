@@ -14,7 +14,7 @@ use crate::report::verdict::SLIP_SEEN_MM;
 use crate::scenario::{ControllerKind, Scenario};
 use crate::session::{Options, RunError, Session, run_session};
 
-pub use grid::{Grid, GridError};
+pub use grid::Grid;
 pub use picture::picture;
 
 /// One strategy at one place of the grid.

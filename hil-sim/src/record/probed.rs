@@ -5,12 +5,8 @@ use std::collections::VecDeque;
 use interstage::supervise::Command;
 
 use super::{Source, SourceError, letter};
-use crate::probe::{Port, ReconnectingPort};
+use crate::probe::{CONSOLE, LOG, Port, ReconnectingPort};
 
-/// RTT channel of the binary log, up.
-const LOG: u32 = 1;
-/// RTT channel of the console, down.
-const CONSOLE: u32 = 0;
 /// Polls of the channel per call, so that the display is updated in between.
 const POLLS: u32 = 20;
 /// Letter of the command that stops the drive.
