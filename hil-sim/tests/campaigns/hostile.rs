@@ -7,7 +7,7 @@
 use super::{at_end, parity};
 use crate::common::RIGS;
 use crate::common::echo::Echo;
-use hil_sim::scenario::Scenario;
+use hil_sim::scenario::{Scenario, ScenarioError};
 use interstage::model::history::History;
 use interstage::model::{Learned, Plan, PlanRequest, Planner, Review};
 use interstage::rig::Rig;
@@ -260,8 +260,13 @@ fn corner_rigs() -> Vec<(String, Rig)> {
         });
         let ends = numbers.filter_map(|info| Some((info.key, info.range?)));
         let corners = ends.flat_map(|(key, (least, most))| {
-            [least, most]
-                .map(|end| (format!("{preset}, {key} = {end}"), at_end(&base, &key, end).0.rig))
+            [least, most].map(|end| {
+                let (nearest, refusal) = at_end(&base, &key, end);
+                // A refusal says what was expected instead.
+                let says = |why: &ScenarioError| why.to_string().contains("expect");
+                assert!(refusal.iter().all(says), "{refusal:?}");
+                (format!("{preset}, {key} = {end}"), nearest.rig)
+            })
         });
         let corners: Vec<_> = corners.collect();
         std::iter::once((preset.to_string(), base.rig)).chain(corners)

@@ -107,6 +107,21 @@ fn the_envelope_writes_its_picture_and_every_key() {
         assert!(number(cell, "slip_mm") >= 0.0);
         assert_eq!(cell["duration_s"].is_number(), completed, "{cell}");
     }
+    let scheduled = |known: bool, friction: f64, load_n: f64| {
+        let at = |cell: &&Value| {
+            (number(cell, "friction"), number(cell, "load_n")) == (friction, load_n)
+                && (&cell["known"], &cell["controller"]) == (&known.into(), &"scheduled".into())
+        };
+        grid.iter().find(at).expect("a cell of the grid")
+    };
+    let is_good = |cell: &Value| cell["completed"] == true && number(cell, "slip_mm") <= 0.05;
+    for known in [true, false] {
+        // With much friction and no load; 30 N hold on no wheel with so little friction.
+        assert!(is_good(scheduled(known, 1.3, 0.0)) && !is_good(scheduled(known, 0.6, 30.0)));
+    }
+    // Knowing it changes the run.
+    let [known, unknown] = [true, false].map(|known| scheduled(known, 1.3, 0.0));
+    assert_ne!(known["duration_s"], unknown["duration_s"]);
     for controller in ["scheduled", "constant", "limit", "reactive"] {
         for part in ["known", "unknown"] {
             assert!((0.0..=1.0).contains(&number(&found["area"][controller], part)));
@@ -115,8 +130,10 @@ fn the_envelope_writes_its_picture_and_every_key() {
     let missing = found["not_contained"].as_array().unwrap();
     assert_eq!(found["scheduled_contains_all"], missing.is_empty());
     assert_eq!(found["files"], serde_json::json!(["out/envelope/envelope.svg"]));
-    let picture = at.join("out/envelope/envelope.svg");
-    assert!(std::fs::read_to_string(picture).unwrap().contains("scheduled, known"));
+    let picture = std::fs::read_to_string(at.join("out/envelope/envelope.svg")).unwrap();
+    for text in ["scheduled, known", "reactive", "% of the grid; seconds", ">0.6</text>"] {
+        assert!(picture.contains(text), "{text}");
+    }
 }
 
 /// Runs both halves of a campaign into files, and what one machine prints of it.

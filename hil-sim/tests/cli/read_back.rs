@@ -111,18 +111,13 @@ fn a_truncated_log_says_how_much_is_missing_and_ends_with_one() {
     }
 }
 
-/// Every header and record of a table.
-fn table(path: &Path) -> (Vec<String>, Vec<csv::StringRecord>) {
-    let mut reader = csv::Reader::from_path(path).unwrap();
-    let head = reader.headers().unwrap().iter().map(str::to_owned).collect();
-    (head, reader.records().map(Result::unwrap).collect())
-}
-
 #[test]
 fn columns_have_no_sentinels_and_modes_and_stages_their_names() {
     let at = &folder();
     good_in(at, &["deploy", "--out", "."]);
-    let (head, rows) = table(&at.join("log.csv"));
+    let mut table = csv::Reader::from_path(at.join("log.csv")).unwrap();
+    let head = table.headers().unwrap().clone();
+    let rows: Vec<csv::StringRecord> = table.records().map(Result::unwrap).collect();
     let column = |name: &str| {
         let place = head.iter().position(|other| other == name).unwrap_or_else(|| panic!("{name}"));
         rows.iter().map(move |row| row[place].to_owned())
