@@ -7,7 +7,7 @@ mod shard;
 use rayon::prelude::*;
 
 pub use frame::{AS_GIVEN, Column, Frame, column};
-pub use shard::{Shard, ShardError};
+pub use shard::Shard;
 
 /// What watches a campaign.
 #[derive(Clone, Copy)]

@@ -14,7 +14,7 @@ use crate::report::verdict::SLIP_SEEN_MM;
 use crate::scenario::{ControllerKind, Scenario};
 use crate::session::{Options, RunError, Session, run_session};
 
-pub use grid::{Grid, GridError};
+pub use grid::Grid;
 pub use picture::picture;
 
 /// One strategy at one place of the grid.
@@ -169,8 +169,6 @@ fn cell(scenario: &Scenario, (known, friction, load_n): Place, controller: Contr
 
 #[cfg(test)]
 mod tests {
-    use std::sync::atomic::{AtomicUsize, Ordering};
-
     use super::*;
     use ControllerKind::{Limit, Scheduled};
 
@@ -214,35 +212,5 @@ mod tests {
         // With slip it has not done it.
         cells[3].slip_mm = Some(1.0);
         assert!(envelope(&cells).not_contained().is_empty());
-    }
-
-    #[test]
-    fn friction_that_the_controller_does_not_know_is_the_plant_s_alone() {
-        let count = AtomicUsize::new(0);
-        let progress = || {
-            count.fetch_add(1, Ordering::Relaxed);
-        };
-        let scenario = Scenario::default();
-        let grid: Grid = "2x2".parse().unwrap();
-        let found = campaign(&scenario, grid).unwrap().complete(&progress).unwrap();
-        assert_eq!((found.cells.len(), count.into_inner()), (32, 8));
-        let cell = |known, friction, load_n| {
-            let at = |cell: &&Cell| {
-                (cell.known, cell.friction, cell.load_n) == (known, friction, load_n)
-                    && cell.controller == ControllerKind::Scheduled
-            };
-            found.cells.iter().find(at).expect("a cell of the grid").clone()
-        };
-        // With much friction and no load every strategy does it, known or not.
-        for known in [true, false] {
-            assert!(cell(known, 1.3, 0.0).good(), "{known}");
-            // 30 N hold on no wheel with so little friction.
-            assert!(!cell(known, 0.6, 30.0).good(), "{known}");
-        }
-        // Knowing it changes the run.
-        assert_ne!(cell(true, 1.3, 0.0).duration_s, cell(false, 1.3, 0.0).duration_s);
-        let drawn = picture(&found);
-        assert!(drawn.starts_with("<svg") && drawn.contains("reactive"));
-        assert!(drawn.contains("% of the grid; seconds") && drawn.contains(">0.6</text>"));
     }
 }

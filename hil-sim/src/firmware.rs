@@ -81,7 +81,7 @@ pub(crate) fn workspace() -> &'static Path {
 }
 
 /// The directory of build results, if nothing but `CARGO_TARGET_DIR` moves it.
-pub(crate) fn target_directory() -> PathBuf {
+pub fn target_directory() -> PathBuf {
     env::var_os("CARGO_TARGET_DIR").map_or_else(|| workspace().join("target"), PathBuf::from)
 }
 

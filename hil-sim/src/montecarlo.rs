@@ -274,16 +274,4 @@ mod tests {
         }
         assert_eq!(limit_text(1), "unknown limit");
     }
-
-    #[test]
-    fn lines_do_not_depend_on_the_number_of_threads() {
-        let scenario = Scenario::default();
-        let with = |threads| {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            pool.install(|| campaign(&scenario, vec![3, 1, 2]).complete(&|| {}).unwrap())
-        };
-        let lines = with(1);
-        assert_eq!(lines.iter().map(|line| line.seed).collect::<Vec<_>>(), [3, 1, 2]);
-        assert_eq!(lines, with(3));
-    }
 }

@@ -17,6 +17,11 @@ pub(crate) use reconnecting::tests as script;
 #[cfg(test)]
 pub(crate) use tests::Mute;
 
+/// RTT channels of the board: up those of the text log and of the binary log, down the console's.
+pub(crate) const TEXT: u32 = 0;
+pub(crate) const LOG: u32 = 1;
+pub(crate) const CONSOLE: u32 = 0;
+
 /// Why a port failed. Displays as one line.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum PortError {

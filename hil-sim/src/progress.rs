@@ -53,16 +53,3 @@ impl Drop for Progress {
         self.0.finish_and_clear();
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn templates_are_right_and_positions_count() {
-        let items = bar("runs", 3);
-        items.advance(2);
-        assert_eq!(items.0.position(), 2);
-        spinner("build").say("link");
-    }
-}

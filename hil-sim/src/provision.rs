@@ -13,7 +13,7 @@ use std::process::{Command, ExitCode};
 
 use crate::firmware::{self, FirmwareError};
 
-pub use tools::Tools;
+pub use tools::{Tools, fetched};
 
 /// A part of `rig` that is a binary of its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

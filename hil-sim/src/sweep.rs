@@ -19,26 +19,19 @@ pub struct Axis {
     pub values: Vec<String>,
 }
 
-/// The text is no key with values.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error(
-    "expected KEY=LOW..HIGH:COUNT, KEY=LOW..HIGH:COUNTlog or KEY=A,B,C, \
-     as in tread.tau_s=0.02..0.2:7{0}"
-)]
-pub struct AxisError(String);
-
 impl FromStr for Axis {
-    type Err = AxisError;
+    type Err = String;
 
-    fn from_str(text: &str) -> Result<Self, AxisError> {
-        let wrong = |why: &str| AxisError(format!(" ({why})"));
-        let (key, values) = text.split_once('=').ok_or(AxisError(String::new()))?;
+    fn from_str(text: &str) -> Result<Self, String> {
+        let form = "expected KEY=LOW..HIGH:COUNT, KEY=LOW..HIGH:COUNTlog or KEY=A,B,C, \
+                    as in tread.tau_s=0.02..0.2:7";
+        let (key, values) = text.split_once('=').ok_or(form)?;
         let values = match values.split_once("..") {
-            Some((low, rest)) => range(low, rest).map_err(|why| wrong(&why))?,
+            Some((low, rest)) => range(low, rest).map_err(|why| format!("{form} ({why})"))?,
             None => values.split(',').map(|value| value.trim().to_owned()).collect(),
         };
         if key.trim().is_empty() || values.iter().any(String::is_empty) {
-            return Err(AxisError(String::new()));
+            return Err(form.to_owned());
         }
         Ok(Self { key: key.trim().to_owned(), values })
     }
@@ -122,7 +115,7 @@ mod tests {
         for text in
             ["tau", "=1..2:3", "a=", "a=1..2", "a=1..x:3", "a=1..2:1", "a=0..2:3log", "a=1,,2"]
         {
-            let error = text.parse::<Axis>().unwrap_err().to_string();
+            let error = text.parse::<Axis>().unwrap_err();
             assert!(error.contains("tread.tau_s=0.02..0.2:7"), "{text}: {error}");
         }
     }

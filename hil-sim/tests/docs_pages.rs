@@ -9,7 +9,7 @@ use std::process::Command;
 use hil_sim::testing::long;
 use serde_json::Value;
 
-use crate::cli::{code, rig_in, stderr};
+use crate::cli::{code, folder, good_in, json, object, rig_in, stderr};
 use crate::common::python::python;
 
 /// Verbs that another program of the workspace runs; the command's own help lists them.
@@ -47,9 +47,7 @@ fn commands(text: &str) -> Vec<&str> {
 
 /// What `rig ARGUMENTS --help` prints.
 fn help(arguments: &[&str]) -> String {
-    let arguments = [arguments, &["--help"]].concat();
-    let output = rig_in(&root(), &arguments);
-    assert_eq!(code(&output), 0, "{arguments:?}: {}", stderr(&output));
+    let output = good_in(&root(), &[arguments, &["--help"]].concat());
     String::from_utf8_lossy(&output.stdout).into_owned()
 }
 
@@ -97,10 +95,9 @@ fn every_command_of_the_pages_exists_with_its_options() {
 #[test]
 fn the_first_deployment_s_page_names_what_to_measure() {
     let page = fs::read_to_string(root().join("docs/GETTING_STARTED.md")).expect("the page");
-    let output = rig_in(&root(), &["keys", "--json"]);
-    let listed: serde_json::Value = serde_json::from_slice(&output.stdout).expect("keys");
+    let listed = object(&good_in(&root(), &["keys", "--json"]));
     let keys = listed["keys"].as_array().expect("keys");
-    let name = |key: &serde_json::Value| key["key"].as_str().expect("a name").to_owned();
+    let name = |key: &Value| key["key"].as_str().expect("a name").to_owned();
     let measured: Vec<String> =
         keys.iter().filter(|key| key["measure"] == true).map(name).collect();
     assert!(measured.len() > 20, "{measured:?}");
@@ -194,10 +191,8 @@ fn the_results_are_those_of_the_figures() {
     let page = |path: &str| fs::read_to_string(root().join(path)).expect("a page");
     let [results, readme] = [page("docs/RESULTS.md"), page("README.md")];
     let script = page("docs/figures.sh");
-    let read = |name: &str| -> serde_json::Value {
-        serde_json::from_str(&page(&format!("docs/figures/{name}.json"))).expect("a figure")
-    };
-    let number = |value: &serde_json::Value| value.as_f64().expect("a number");
+    let read = |name: &str| json(&root().join(format!("docs/figures/{name}.json")));
+    let number = |value: &Value| value.as_f64().expect("a number");
     for (name, direction) in [("montecarlo", "deploy"), ("montecarlo-retract", "retract")] {
         let found = read(name);
         let shown = |key: &str, parts: &[&str], n: usize| {
@@ -278,24 +273,22 @@ fn the_examples_end_as_their_page_says() {
 
 #[test]
 fn a_log_is_drawn_and_a_table_without_its_columns_is_refused() {
-    let folder = tempfile::tempdir().expect("a temporary directory");
-    let run = rig_in(folder.path(), &["deploy", "--out", "run"]);
-    assert_eq!(code(&run), 0, "{}", stderr(&run));
+    let at = &folder();
+    good_in(at, &["deploy", "--out", "run"]);
     let draw = |log: &str, step: &str| {
         let script = root().join("examples/plot_log.py");
         let mut python = Command::new("python3");
-        python.current_dir(folder.path()).arg(script).args([log, step, "out.svg"]);
+        python.current_dir(&**at).arg(script).args([log, step, "out.svg"]);
         python.output().expect("python3 starts")
     };
     let output = draw("run/log.csv", "2");
     assert!(output.status.success(), "{}", stderr(&output));
-    assert!(fs::read_to_string(folder.path().join("out.svg")).unwrap().ends_with("</svg>\n"));
+    assert!(fs::read_to_string(at.join("out.svg")).unwrap().ends_with("</svg>\n"));
     let gap = figure(std::str::from_utf8(&output.stdout).unwrap(), "gap ").expect("a gap");
-    let summary = fs::read_to_string(folder.path().join("run/summary.json")).unwrap();
-    let summary: serde_json::Value = serde_json::from_str(&summary).unwrap();
+    let summary = json(&at.join("run/summary.json"));
     let measured = summary["crossings"][1]["gap_measured_mm"].as_f64().expect("a gap");
     assert!((gap - measured).abs() < 6e-4, "{gap} and {measured} mm");
-    fs::write(folder.path().join("bad.csv"), "tick,level\n0,0\n").unwrap();
+    fs::write(at.join("bad.csv"), "tick,level\n0,0\n").unwrap();
     for (log, step, why) in [("run/log.csv", "9", "step 9"), ("bad.csv", "1", "bad.csv")] {
         let refused = draw(log, step);
         assert_eq!(refused.status.code(), Some(1));
@@ -317,17 +310,16 @@ fn pandas_draws_a_log_alike() {
             return;
         }
     };
-    let folder = tempfile::tempdir().expect("a temporary directory");
-    let run = rig_in(folder.path(), &["capture", "--out", "run"]);
-    assert_eq!(code(&run), 0, "{}", stderr(&run));
+    let at = &folder();
+    good_in(at, &["capture", "--out", "run"]);
     let script = root().join("examples/plot_log.py");
     let draw = |isolated: bool, out: &str| {
         let mut command = Command::new(&python);
         // `-S` leaves the environment's packages out.
         command.args(isolated.then_some("-S")).arg(&script).args(["run/log.csv", "3", out]);
-        let output = command.current_dir(folder.path()).output().expect("it starts");
+        let output = command.current_dir(&**at).output().expect("it starts");
         assert!(output.status.success(), "{}", stderr(&output));
-        fs::read_to_string(folder.path().join(out)).expect("a picture")
+        fs::read_to_string(at.join(out)).expect("a picture")
     };
     let has_pandas = |isolated: bool| {
         let mut command = Command::new(&python);
@@ -382,17 +374,15 @@ for split in root.findall('tabbed_widget/Tab/Container/DockSplitter'):
 
 #[test]
 fn layouts_of_viewers_name_what_a_log_has() {
-    let folder = tempfile::tempdir().expect("a temporary directory");
-    let run = rig_in(folder.path(), &["capture", "--out", "run"]);
-    assert_eq!(code(&run), 0, "{}", stderr(&run));
-    let topics = fields(&folder.path().join("run/log.mcap"));
+    let at = &folder();
+    good_in(at, &["capture", "--out", "run"]);
+    let topics = fields(&at.join("run/log.mcap"));
     let has = |topic: &str, field: &str| {
         topics.get(topic).is_some_and(|fields| fields.iter().any(|name| name == field))
     };
     let layouts = root().join("examples/layouts");
 
-    let text = fs::read_to_string(layouts.join("foxglove.json")).expect("a layout");
-    let layout: Value = serde_json::from_str(&text).expect("JSON");
+    let layout = json(&layouts.join("foxglove.json"));
     let mut shown = Vec::new();
     panels(&layout["layout"], &mut shown);
     let configured = layout["configById"].as_object().expect("panels");

@@ -10,13 +10,9 @@ use interstage::units::Duty;
 
 use super::BringupError;
 use crate::params::{Client, Held, Store, StoreError};
-use crate::probe::{Port, PortError};
+use crate::probe::{CONSOLE, LOG, Port, PortError};
 use crate::record::{Decoder, Item, letter};
 
-/// RTT channel of the binary log.
-const LOG: u32 = 1;
-/// RTT channel of the console.
-const CONSOLE: u32 = 0;
 /// Time after which a request is repeated, ms of the board: a quarter of the firmware's dead
 /// man.
 const REPEAT_MS: u32 = 50;

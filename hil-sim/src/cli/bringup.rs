@@ -3,7 +3,7 @@
 use std::io;
 use std::path::PathBuf;
 
-use serde::Serialize;
+use serde_json::{Map, Value, json};
 
 use super::failure::{Failure, Outcome};
 use super::output;
@@ -49,15 +49,6 @@ pub struct Args {
     /// Prints the result as one JSON object.
     #[arg(long)]
     json: bool,
-}
-
-/// What `--json` prints.
-#[derive(Serialize)]
-struct Printed<'a> {
-    complete: bool,
-    checks: Vec<&'a Check>,
-    /// Key and measured value of each parameter that is to change.
-    proposed: std::collections::BTreeMap<String, String>,
 }
 
 impl Args {
@@ -125,13 +116,14 @@ pub fn carry_out(
     write_text(&files[1], &bringup::html(&progress))?;
     write_text(&files[2], &progress.proposed.to_toml())?;
     ended.map_err(Failure::run)?;
-    let proposed = bringup::proposals(&progress);
-    let printed = Printed {
-        complete: progress.is_complete(),
-        checks: progress.checks().collect(),
-        proposed: proposed.into_iter().map(|(key, _, is)| (key, is)).collect(),
-    };
-    let printed = output::WithFiles { result: &printed, files: &files };
+    // Key and measured value of each parameter that is to change.
+    let proposed = bringup::proposals(&progress).into_iter().map(|(key, _, is)| (key, is.into()));
+    let printed = json!({
+        "complete": progress.is_complete(),
+        "checks": progress.checks().collect::<Vec<_>>(),
+        "proposed": proposed.collect::<Map<String, Value>>(),
+        "files": files,
+    });
     output::result(args.json, &printed, || human(&progress) + &output::wrote(&files))?;
     Ok(Outcome::of(progress.is_complete()))
 }

@@ -2,12 +2,11 @@
 
 use std::path::PathBuf;
 
-use serde::Serialize;
 use serde_json::{Map, Value, json};
 
 use super::campaign::CampaignArgs;
 use super::failure::{Failure, Outcome};
-use super::output::{self, WithFiles};
+use super::output;
 use super::scenario::RunArgs;
 use crate::campaign::{Column, Frame, column};
 use crate::compare::STRATEGIES;
@@ -43,17 +42,6 @@ pub(super) struct Args {
     pub(super) campaign: CampaignArgs,
 }
 
-/// What `--json` prints.
-#[derive(Serialize)]
-struct Printed<'a> {
-    grid: &'a [Cell],
-    area: Map<String, Value>,
-    /// Whether the scheduled strategy completes without slip wherever another one does.
-    scheduled_contains_all: bool,
-    /// Where it does not.
-    not_contained: Vec<Value>,
-}
-
 pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     args.run.without("controller", "every strategy has its map")?;
     let scenario = args.run.resolve()?;
@@ -68,8 +56,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
         write_text(&path, &envelope::picture(found))?;
         files.push(path);
     }
-    let printed = machine(found);
-    let printed = WithFiles { result: &printed, files: &files };
+    let printed = machine(found, &files);
     let text = || human(found) + &output::wrote(&files);
     let rows = Frame::of(&COLUMNS, &found.cells);
     carried_out.print(&args.campaign, &printed, &rows, text, true)
@@ -86,19 +73,22 @@ const COLUMNS: [Column; 7] = [
     column("duration_s", "duration", "s", 3),
 ];
 
-fn machine(found: &Envelope) -> Printed<'_> {
+/// What `--json` prints.
+fn machine(found: &Envelope, files: &[PathBuf]) -> Value {
     let area = |kind: ControllerKind| (kind.name().to_owned(), json!(found.area(kind)));
     let missing = found.not_contained();
     let place = |cell: &&Cell| {
         let Cell { friction, load_n, known, controller, .. } = *cell;
         json!({ "friction": friction, "load_n": load_n, "known": known, "controller": controller })
     };
-    Printed {
-        grid: &found.cells,
-        area: STRATEGIES.into_iter().map(area).collect(),
-        scheduled_contains_all: missing.is_empty(),
-        not_contained: missing.iter().map(place).collect(),
-    }
+    json!({
+        "grid": found.cells,
+        "area": STRATEGIES.into_iter().map(area).collect::<Map<_, _>>(),
+        // Whether the scheduled strategy completes without slip wherever another one does.
+        "scheduled_contains_all": missing.is_empty(),
+        "not_contained": missing.iter().map(place).collect::<Vec<_>>(),
+        "files": files,
+    })
 }
 
 const HEADLINE: &str = "Part of the grid in which each strategy completes without slip, and its \

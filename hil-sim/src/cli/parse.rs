@@ -41,31 +41,3 @@ pub(super) fn line(text: &str) -> String {
     });
     one_line(&said.collect::<Vec<_>>().join("\n"))
 }
-
-#[cfg(test)]
-mod tests {
-    use clap::Parser;
-
-    use super::*;
-    use crate::cli::Cli;
-
-    fn said(arguments: &[&str]) -> String {
-        let all = std::iter::once("rig").chain(arguments.iter().copied());
-        line(&Cli::try_parse_from(all).unwrap_err().to_string())
-    }
-
-    #[test]
-    fn an_error_is_one_line_that_names_the_option() {
-        assert_eq!(
-            said(&["crossing", "--speed-mm-s", "5"]),
-            "error: the following required arguments were not provided: --preload-n <P>"
-        );
-        let text = said(&["deploy", "--seed", "x"]);
-        assert!(text.starts_with("error: invalid value 'x' for '--seed <N>'"), "{text}");
-        let text = said(&["deploy", "--rig", "moon"]);
-        assert!(text.contains("'--rig <NAME>'") && text.contains("prototype"), "{text}");
-        let text = said(&["deploy", "--sead", "1"]);
-        assert!(text.contains("--sead") && text.contains("--seed"), "{text}");
-        assert!(!text.contains('\n') && !text.contains("Usage"), "{text}");
-    }
-}

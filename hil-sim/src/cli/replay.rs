@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
+use serde_json::json;
 
 use super::failure::{Failure, Outcome};
 use super::output;
@@ -30,13 +31,7 @@ pub struct Args {
     json: bool,
 }
 
-/// What `--json` prints.
-#[derive(Serialize)]
-struct Printed {
-    equal: bool,
-    logs: Vec<Log>,
-}
-
+/// What `--json` prints of a log.
 #[derive(Serialize)]
 struct Log {
     file: PathBuf,
@@ -56,9 +51,10 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
         let (equal, cut) = (result.is_equal() && run.cut.is_none(), run.cut);
         logs.push(Log { file: file.clone(), equal, cut, result });
     }
-    let printed = Printed { equal: logs.iter().all(|log| log.equal), logs };
-    output::result(args.json, &printed, || printed.logs.iter().map(human).collect())?;
-    Ok(Outcome::of(printed.equal))
+    let equal = logs.iter().all(|log| log.equal);
+    let printed = json!({ "equal": equal, "logs": logs });
+    output::result(args.json, &printed, || logs.iter().map(human).collect())?;
+    Ok(Outcome::of(equal))
 }
 
 /// The parameters of the controller that made a log are not known.

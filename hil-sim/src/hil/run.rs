@@ -9,15 +9,11 @@ use interstage::supervise::Mode;
 use interstage::units::Tick;
 
 use super::{HilError, HostLine};
-use crate::probe::Port;
+use crate::probe::{LOG, Port, TEXT};
 use crate::record::{JoinedLog, Recording, starter};
 use crate::scenario::{ControllerKind, Scenario, TICK_S};
 use crate::session::{drives, initial_rig, longest_s, read};
 
-/// RTT channel of the binary log.
-const LOG: u32 = 1;
-/// RTT channel of the text log, read only so that it does not fill.
-const TEXT: u32 = 0;
 /// Ticks between two polls of the log; the channel holds a hundred.
 const POLL: Tick = 16;
 /// Ticks after the end within which the log arrives: two frames and a poll.

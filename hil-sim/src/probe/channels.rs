@@ -1,7 +1,6 @@
 //! RTT channels over a probe: a handle to them, which a restart of the board makes stale.
 
-/// RTT channel of the console, down.
-const CONSOLE: u32 = 0;
+use super::CONSOLE;
 
 /// Why an access to a channel failed.
 #[derive(Debug)]

@@ -208,23 +208,6 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn a_port_continues_after_it_was_unplugged() {
-        use Next::{NotThere, Opens, Unplugged};
-        let [ab, c, d] = [&b"ab"[..], b"c", b"d"].map(Next::bytes);
-        let script = [Opens, ab, Unplugged, NotThere, NotThere, Opens, c, d];
-        let (mut port, left) = open(script, Duration::from_secs(60));
-        let mut read = Vec::new();
-        for _ in 0..6 {
-            read.extend(port.up(1).unwrap());
-        }
-        assert_eq!(read, b"abcd");
-        assert!(left.borrow().is_empty());
-        let news = port.take_news();
-        assert!(news.len() == 2 && news[0].contains("USB error"), "{news:?}");
-        assert!(news[1].contains("back"), "{news:?}");
-    }
-
-    #[test]
     fn it_gives_up_after_the_timeout() {
         let (mut port, _) = open([Next::Opens, Next::Unplugged], Duration::ZERO);
         assert_eq!(port.up(1), Ok(Vec::new()));

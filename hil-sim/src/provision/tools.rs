@@ -37,9 +37,9 @@ impl Tools {
         let place = firmware::target_directory().join(FOLDER);
         let failed = |why: &str| ProvisionError::Tools(place.clone(), why.into());
         let headers = headers()?.ok_or_else(|| failed("the C compiler names no headers"))?;
-        if !is_complete(&place) || !starts(&place) {
+        if !is_complete(&place, &WHEELS) || !starts(&place) {
             eprintln!("fetching cmake, ninja and libclang into {}", place.display());
-            fetch(&place)?;
+            fetch(&place, &WHEELS).map_err(|why| failed(&why))?;
         }
         let libclang =
             find(&place, "libclang").ok_or_else(|| failed("no libclang in its wheel"))?;
@@ -62,9 +62,14 @@ impl Tools {
     }
 }
 
-/// Whether these versions of the wheels are there.
-fn is_complete(place: &Path) -> bool {
-    fs::read_to_string(place.join(COMPLETE)).is_ok_and(|text| text == WHEELS.join("\n"))
+/// Whether these packages are there, of these versions.
+fn is_complete(place: &Path, packages: &[&str]) -> bool {
+    fs::read_to_string(place.join(COMPLETE)).is_ok_and(|text| text == packages.join("\n"))
+}
+
+/// Puts these packages, each `name==version`, into a virtual environment, unless it has them.
+pub fn fetched(place: &Path, packages: &[&str]) -> Result<(), String> {
+    if is_complete(place, packages) { Ok(()) } else { fetch(place, packages) }
 }
 
 /// Whether the programs start: they name their interpreter by its path, so that a moved or
@@ -76,11 +81,11 @@ fn starts(place: &Path) -> bool {
     })
 }
 
-/// Puts the wheels there: into a virtual environment or, where Python lacks `venv`, by pip
-/// into a plain folder.
-fn fetch(place: &Path) -> Result<(), ProvisionError> {
-    let failed = |why| ProvisionError::Tools(place.to_owned(), why);
-    let file = |error: std::io::Error| failed(error.to_string());
+/// Puts packages there: into a virtual environment or, where Python lacks `venv`, by pip into a
+/// plain folder. An error says why not.
+fn fetch(place: &Path, packages: &[&str]) -> Result<(), String> {
+    let file = |error: std::io::Error| error.to_string();
+    let output = |command: &mut Command| output(command).map_err(|error| error.to_string());
     if place.exists() {
         fs::remove_dir_all(place).map_err(file)?;
     }
@@ -95,15 +100,15 @@ fn fetch(place: &Path) -> Result<(), ProvisionError> {
         pip.args(PIP.split_whitespace()).arg("--target").arg(place);
         pip
     };
-    let installed = output(pip.args(WHEELS))?;
+    let installed = output(pip.args(packages))?;
     if !installed.status.success() {
         // An incomplete folder must not remain.
         let _ = fs::remove_dir_all(place);
         let said = String::from_utf8_lossy(&installed.stderr);
         let last = said.lines().rev().map(str::trim).find(|line| !line.is_empty());
-        return Err(failed(last.unwrap_or("it did not say why").to_owned()));
+        return Err(last.unwrap_or("it did not say why").to_owned());
     }
-    fs::write(place.join(COMPLETE), WHEELS.join("\n")).map_err(file)
+    fs::write(place.join(COMPLETE), packages.join("\n")).map_err(file)
 }
 
 /// The folder below `place` in which a file begins with `name` and is a library.
@@ -149,11 +154,11 @@ mod tests {
     #[test]
     fn what_was_fetched_for_other_versions_is_not_complete() {
         let place = tempfile::tempdir().unwrap();
-        assert!(!is_complete(place.path()));
+        assert!(!is_complete(place.path(), &WHEELS));
         fs::write(place.path().join(COMPLETE), "cmake==1").unwrap();
-        assert!(!is_complete(place.path()));
+        assert!(!is_complete(place.path(), &WHEELS));
         fs::write(place.path().join(COMPLETE), WHEELS.join("\n")).unwrap();
-        assert!(is_complete(place.path()));
+        assert!(is_complete(place.path(), &WHEELS));
     }
 
     #[cfg(unix)]

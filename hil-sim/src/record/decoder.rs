@@ -4,7 +4,7 @@
 //! frame. A target has restarted if its sequence or its clock goes back.
 
 use crate::table::counted;
-use interstage::log::frame::{Body, Found, Frame, find};
+use interstage::log::frame::{Body, Found, Frame, LONGEST, find};
 use interstage::log::identity::SCHEMA;
 use interstage::log::ledger::Line;
 use interstage::log::{Flags, Identity, Record};
@@ -27,6 +27,8 @@ pub enum Item {
     Ledger(Line),
     /// Something is missing here.
     Mark(Mark),
+    /// The bytes of a frame, behind its items, with those before it that are no frame.
+    Frame(Vec<u8>),
 }
 
 /// What is missing at a place of a log, and why.
@@ -124,8 +126,9 @@ impl Counts {
 pub struct Decoder {
     /// The beginning of a frame that is not complete yet.
     partial: Vec<u8>,
-    /// Bytes before it that are no frame.
+    /// Bytes before it that are no frame: their number, and those that no item has had yet.
     garbage: u64,
+    strange: Vec<u8>,
     /// Sequence and count of dropped frames expected in the next head.
     due: Option<(u32, u32)>,
     /// Time of the last tick and its codes.
@@ -154,6 +157,10 @@ impl Decoder {
         let used = self.find(&held, false, take);
         held.drain(..used);
         self.partial = held;
+        // Only the end of them may become a frame.
+        if self.strange.len() > LONGEST {
+            take(Item::Frame(std::mem::take(&mut self.strange)));
+        }
     }
 
     /// The log ends here; a frame that has begun is garbage.
@@ -168,23 +175,24 @@ impl Decoder {
     fn find(&mut self, bytes: &[u8], last: bool, take: &mut impl FnMut(Item)) -> usize {
         let mut used = 0;
         while let Some(rest) = bytes.get(used..).filter(|rest| !rest.is_empty()) {
-            used += match find(rest) {
+            let length = match find(rest) {
                 Found::Frame(frame, length) => {
                     self.report_garbage(take);
                     self.frame(&frame, length as u64, take);
-                    length
+                    let mut bytes = std::mem::take(&mut self.strange);
+                    bytes.extend_from_slice(&rest[..length]);
+                    take(Item::Frame(bytes));
+                    used += length;
+                    continue;
                 }
-                Found::Garbage(length) => {
-                    self.garbage += length as u64;
-                    length
-                }
+                Found::Garbage(length) => length,
                 // What looks like the beginning of a frame may be garbage before a frame.
-                Found::Part if last => {
-                    self.garbage += 1;
-                    1
-                }
+                Found::Part if last => 1,
                 Found::Part => break,
             };
+            self.garbage += length as u64;
+            self.strange.extend_from_slice(&rest[..length]);
+            used += length;
         }
         used
     }

@@ -6,7 +6,6 @@ use super::csv_file::{self, Metadata as TableMetadata};
 use super::mcap_file::unwrapped;
 use super::tick::OFF;
 use super::{Controller, Decoder, FRAMES, Mark, Run};
-use interstage::log::frame::{Found, find};
 use mcap::records::{Metadata, Record};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
@@ -48,25 +47,6 @@ pub fn log_at(path: &Path) -> PathBuf {
 /// The content of the file at `path`.
 pub(super) fn content(path: &Path) -> Result<Vec<u8>, ReadError> {
     std::fs::read(path).map_err(|error| ReadError::File(path.display().to_string(), error))
-}
-
-/// The stream, cut after every frame; what follows the last one is left out.
-pub fn pieces(stream: &[u8]) -> impl Iterator<Item = &[u8]> {
-    let mut rest = stream;
-    std::iter::from_fn(move || {
-        let mut used = 0;
-        loop {
-            used += match find(rest.get(used..).filter(|rest| !rest.is_empty())?) {
-                Found::Garbage(length) => length,
-                Found::Part => 1,
-                Found::Frame(_, length) => {
-                    let (piece, behind) = rest.split_at(used + length);
-                    rest = behind;
-                    return Some(piece);
-                }
-            };
-        }
-    })
 }
 
 impl Run {
@@ -263,24 +243,6 @@ pub(super) mod tests {
         for cut in 0..good.len() {
             assert!(credible(&good[..cut]).0.len() <= cut);
         }
-    }
-
-    #[test]
-    fn the_bytes_of_the_channel_are_a_log() {
-        let run = read(&frames(0, 80).concat()).unwrap();
-        assert_eq!(run.rows.len(), 80);
-        assert!(run.is_complete());
-        assert_eq!(run.header.unwrap().rig, "test");
-    }
-
-    #[test]
-    fn a_stream_is_cut_behind_its_frames() {
-        let all = frames(0, 80);
-        let stream = [b"strange", &all.concat()[..], &all[3][..9]].concat();
-        let cut: Vec<&[u8]> = pieces(&stream).collect();
-        assert_eq!(cut.len(), all.len());
-        assert_eq!(cut[0], [b"strange", &all[0][..]].concat());
-        assert!(cut[1..].iter().zip(&all[1..]).all(|(piece, frame)| piece == frame));
     }
 
     #[test]

@@ -78,10 +78,10 @@ fn with_truth(bytes: &[u8], strange: &mut Vec<String>) -> Option<Recording> {
 
 /// The recordings of a log without truth; each says what restarted the target behind it.
 fn boots(run: &Run) -> Vec<Recording> {
-    let boots = run.by_boot();
+    let boots: Vec<Run> = (0..=run.boots.len()).map(|boot| run.since_boot(boot)).collect();
     let mut recordings: Vec<Recording> = boots.iter().map(measured).collect();
     for (recording, next) in recordings.iter_mut().zip(boots.iter().skip(1)) {
-        let cause = next.since_boot(0).restart();
+        let cause = next.restart();
         recording.summary.restart =
             Some(cause.map_or_else(|| "no cause in the log".to_owned(), restart_words));
     }

@@ -95,39 +95,6 @@ pub struct Boot {
     pub ledger: usize,
 }
 
-/// Items from one start of the target to the next.
-#[derive(Clone, Copy, Debug)]
-pub struct Since<'a> {
-    pub rows: &'a [Controller],
-    pub events: &'a [Entry],
-    /// Plans with the ticks that received them.
-    pub plans: &'a [(u32, Plan)],
-    /// Requests with the ticks that made them.
-    pub requests: &'a [(u32, PlanRequest)],
-    pub ledger: &'a [Line],
-}
-
-impl Since<'_> {
-    /// Why the target started, if the log has it.
-    pub fn restart(&self) -> Option<Restart> {
-        self.events.iter().find_map(|entry| match entry.event {
-            Event::Restart(restart) => Some(restart),
-            _ => None,
-        })
-    }
-
-    /// Duties that the host asked for in the service mode, as of this tick: only a change is an
-    /// event.
-    pub fn service(&self, tick: u32) -> ServiceDuties {
-        let before = self.events.iter().rev().filter(|entry| entry.at <= tick);
-        let mut asked = before.filter_map(|entry| match entry.event {
-            Event::Service(duties) => Some(duties),
-            _ => None,
-        });
-        asked.next().unwrap_or(ServiceDuties::REST)
-    }
-}
-
 /// A log in memory.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Run {
@@ -211,42 +178,48 @@ impl Run {
                 }
                 self.marks.push((self.rows.len(), *mark));
             }
+            Item::Frame(_) => {}
         }
     }
 
-    /// The items of a start of the target, counted from 0. Each start counts its ticks from 0.
-    pub fn since_boot(&self, boot: usize) -> Since<'_> {
+    /// The log of a start of the target, counted from 0, without marks. Each start counts its
+    /// ticks from 0. What is missing is counted in the last.
+    pub fn since_boot(&self, boot: usize) -> Self {
         let from = boot.checked_sub(1).and_then(|before| self.boots.get(before));
         let from = from.copied().unwrap_or_default();
         let to = self.boots.get(boot).copied().unwrap_or_else(|| self.end());
-        Since {
-            rows: self.rows.get(from.rows..to.rows).unwrap_or_default(),
-            events: self.events.get(from.events..to.events).unwrap_or_default(),
-            plans: self.plans.get(from.plans..to.plans).unwrap_or_default(),
-            requests: self.requests.get(from.requests..to.requests).unwrap_or_default(),
-            ledger: self.ledger.get(from.ledger..to.ledger).unwrap_or_default(),
+        let is_last = boot == self.boots.len();
+        Self {
+            header: self.header.clone(),
+            rows: self.rows[from.rows..to.rows].to_vec(),
+            events: self.events[from.events..to.events].to_vec(),
+            plans: self.plans[from.plans..to.plans].to_vec(),
+            requests: self.requests[from.requests..to.requests].to_vec(),
+            ledger: self.ledger[from.ledger..to.ledger].to_vec(),
+            counts: if is_last { self.counts } else { Counts::default() },
+            parameters: self.parameters.clone(),
+            cut: self.cut.filter(|_| is_last),
+            ..Self::default()
         }
     }
 
-    /// Rows, events and ledger of each start of the target, on its own clock. What is missing is
-    /// counted in the last.
-    pub fn by_boot(&self) -> Vec<Self> {
-        let last = self.boots.len();
-        let boot = |place: usize| {
-            let Since { rows, events, ledger, .. } = self.since_boot(place);
-            let is_last = place == last;
-            Self {
-                header: self.header.clone(),
-                rows: rows.to_vec(),
-                events: events.to_vec(),
-                ledger: ledger.to_vec(),
-                counts: if is_last { self.counts } else { Counts::default() },
-                parameters: self.parameters.clone(),
-                cut: self.cut.filter(|_| is_last),
-                ..Self::default()
-            }
-        };
-        (0..=last).map(boot).collect()
+    /// Why the target started first, if the log has it.
+    pub fn restart(&self) -> Option<Restart> {
+        self.events.iter().find_map(|entry| match entry.event {
+            Event::Restart(restart) => Some(restart),
+            _ => None,
+        })
+    }
+
+    /// Duties that the host asked for in the service mode, as of this tick: only a change is an
+    /// event.
+    pub fn service(&self, tick: u32) -> ServiceDuties {
+        let before = self.events.iter().rev().filter(|entry| entry.at <= tick);
+        let mut asked = before.filter_map(|entry| match entry.event {
+            Event::Service(duties) => Some(duties),
+            _ => None,
+        });
+        asked.next().unwrap_or(ServiceDuties::REST)
     }
 
     /// What has come so far.

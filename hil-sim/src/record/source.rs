@@ -162,21 +162,7 @@ impl<R: RunningRig<Error: std::error::Error + Send + Sync + 'static>> Source for
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::record::{Controller, Run};
-
-    #[test]
-    fn a_run_without_an_operator_starts_and_ends_by_itself() {
-        let mut source = Virtual::new(&Scenario::default(), false).unwrap();
-        let mut bytes = Vec::new();
-        while let Some(part) = source.read().unwrap() {
-            bytes.extend(part);
-        }
-        let run = Run::of_stream(&bytes);
-        assert!(run.is_complete());
-        let last = run.rows.last().and_then(Controller::mode).unwrap();
-        assert!(matches!(last, Mode::Complete(_)), "{last:?}");
-        assert_eq!(run.ledger.len(), 3);
-    }
+    use crate::record::Run;
 
     #[test]
     fn rows_that_nobody_reads_are_not_kept() {

@@ -53,7 +53,7 @@ impl View {
             Item::Identity(identity) => self.rig = Some(identity.rig.as_str().to_owned()),
             Item::Event(entry) => self.event = text(&entry.event),
             Item::Mark(mark) => self.mark = Some(*mark),
-            Item::Plan(..) | Item::Request(..) | Item::Ledger(_) => {}
+            Item::Plan(..) | Item::Request(..) | Item::Ledger(_) | Item::Frame(_) => {}
         }
     }
 

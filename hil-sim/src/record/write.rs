@@ -6,13 +6,11 @@
 use std::io::{Seek, Write};
 use std::path::{Path, PathBuf};
 
-use interstage::log::frame::LONGEST;
-
 use super::csv_file::{Metadata, write_metadata, write_row};
 use super::mcap_file::{McapFile, TICK_NS, wrapped};
 use super::tick::OFF;
 use super::{
-    Controller, Counts, Decoder, Header, Item, Mark, Recording, Run, Tick, Topic, messages, pieces,
+    Controller, Counts, Decoder, Header, Item, Mark, Recording, Run, Tick, Topic, messages,
     write_mcap,
 };
 use crate::files::{Failure, FileError, atomic_write, make_directory, with_causes};
@@ -73,7 +71,6 @@ pub struct Writer<M: Write + Seek, C: Write> {
     /// Whether ticks go into the MCAP file beside the frames.
     decoded: bool,
     decoder: Decoder,
-    partial: Vec<u8>,
     header: Option<Header>,
     /// Time of the latest message, ns; it never goes back.
     now: u64,
@@ -103,7 +100,6 @@ impl<M: Write + Seek, C: Write> Writer<M, C> {
             csv: csv.map(csv::Writer::from_writer),
             decoded,
             decoder: Decoder::new(),
-            partial: Vec::new(),
             header: None,
             now: 0,
             start: 0,
@@ -133,21 +129,9 @@ impl<M: Write + Seek, C: Write> Writer<M, C> {
     }
 
     fn try_take(&mut self, bytes: &[u8], see: &mut impl FnMut(&Item)) -> Result<(), Failure> {
-        let mut held = std::mem::take(&mut self.partial);
-        held.extend_from_slice(bytes);
-        let mut used = 0;
-        for frame in pieces(&held) {
-            used += frame.len();
-            self.frame(frame, see)?;
-        }
-        // Only the end of the rest may become a frame.
-        let garbage = (held.len() - used).saturating_sub(LONGEST);
-        if garbage > LONGEST {
-            self.frame(&held[used..used + garbage], see)?;
-            used += garbage;
-        }
-        held.drain(..used);
-        self.partial = held;
+        let mut items = Vec::new();
+        self.decoder.read(bytes, &mut |item| items.push(item));
+        self.items(&items, see)?;
         if self.counts().ticks >= self.kept + FLUSH_TICKS {
             self.flush()?;
         }
@@ -156,16 +140,6 @@ impl<M: Write + Seek, C: Write> Writer<M, C> {
 
     fn failed(&self, source: Failure) -> WriteError {
         WriteError { ticks: self.counts().ticks, kept: self.kept, source }
-    }
-
-    fn frame(&mut self, frame: &[u8], see: &mut impl FnMut(&Item)) -> Result<(), Failure> {
-        let mut items = Vec::new();
-        self.decoder.read(frame, &mut |item| items.push(item));
-        self.items(&items, see)?;
-        if let Some(mcap) = &mut self.mcap {
-            mcap.message(self.now, Topic::Frames, &wrapped(frame))?;
-        }
-        Ok(())
     }
 
     fn items(&mut self, items: &[Item], see: &mut impl FnMut(&Item)) -> Result<(), Failure> {
@@ -183,9 +157,11 @@ impl<M: Write + Seek, C: Write> Writer<M, C> {
                 Item::Identity(identity) => self.identify(Header::from(identity))?,
                 _ => {}
             }
-            if let (Some(mcap), Some((topic, body))) = (&mut self.mcap, messages(item))
-                && (self.decoded || topic != Topic::Tick)
-            {
+            let message = match item {
+                Item::Frame(bytes) => Some((Topic::Frames, wrapped(bytes))),
+                item => messages(item).filter(|(topic, _)| self.decoded || *topic != Topic::Tick),
+            };
+            if let (Some(mcap), Some((topic, body))) = (&mut self.mcap, message) {
                 mcap.message(self.now, topic, &body)?;
             }
         }
@@ -368,16 +344,5 @@ mod tests {
             .collect();
         // A NaN differs from itself; its text does not.
         assert_eq!(format!("{rows:?}"), format!("{:?}", recording.rows));
-    }
-
-    #[test]
-    fn an_error_names_the_path() {
-        let directory = tempfile::tempdir().unwrap();
-        let file = directory.path().join("taken");
-        std::fs::write(&file, "").unwrap();
-        let error = write_all(&example::deploy(), &file.join("run")).unwrap_err().to_string();
-        assert!(error.contains("taken/run: cannot make the directory"), "{error}");
-        let error = write_csv(&Recording::default(), &file.join("log.csv")).unwrap_err();
-        assert!(error.to_string().contains("taken/log.csv: cannot be written"), "{error}");
     }
 }

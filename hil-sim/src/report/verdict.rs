@@ -22,20 +22,16 @@ pub(crate) const GAP_TOLERANCE: f64 = 0.03;
 /// Gross slip from which a run no longer counts as free of slip, mm.
 pub(crate) const SLIP_SEEN_MM: f64 = 0.05;
 
-/// A run's faults of the second grade, in words; empty for the others.
-pub(crate) fn reservations(summary: &Summary) -> Vec<&'static str> {
-    if Grade::of(summary) != Grade::Fair {
-        return Vec::new();
-    }
-    gap_reservation(summary).into_iter().chain(slips(summary)).collect()
-}
-
-fn gap_reservation(summary: &Summary) -> Option<&'static str> {
-    match gap_excess(summary)? {
+/// What a run that completed is not good for, in words. What a log without truth measures as slip
+/// includes creep and the steps' tolerances, so that it shows none.
+fn reservations(summary: &Summary) -> Vec<&'static str> {
+    let gap = gap_excess(summary).and_then(|excess| match excess {
         excess if excess > GAP_TOLERANCE => Some("over the reference gap"),
         excess if excess.is_nan() => Some("gap unknown"),
         _ => None,
-    }
+    });
+    let slips = !summary.measured && summary.slip_mm > SLIP_SEEN_MM;
+    gap.into_iter().chain(slips.then_some("the wheel slipped")).collect()
 }
 
 /// Why a run has its grade, and what takes most time beside travel at cruise speed.
@@ -47,17 +43,12 @@ pub(crate) fn verdict(summary: &Summary) -> String {
             format!("good: every gap at most {most:.0} % over the reference{slip}")
         }
         Grade::Good => "good".to_owned(),
-        _ => reservations(summary).join(", "),
+        Grade::Fair => reservations(summary).join(", "),
+        Grade::Bad => String::new(),
     };
     let slow = summary.lost.as_ref().map(|lost| format!("largest loss of time: {}", lost.main()));
     let parts = [Some(why).filter(|why| !why.is_empty()), slow];
     parts.into_iter().flatten().collect::<Vec<_>>().join("; ")
-}
-
-/// Says if the wheel slipped. What a log without truth measures includes creep and the steps'
-/// tolerances, so that it shows no slip.
-fn slips(summary: &Summary) -> Option<&'static str> {
-    (!summary.measured && summary.slip_mm > SLIP_SEEN_MM).then_some("the wheel slipped")
 }
 
 impl Grade {
@@ -75,10 +66,10 @@ impl Grade {
     pub(crate) fn of(summary: &Summary) -> Self {
         if !summary.completed || !summary.faults.is_empty() {
             Self::Bad
-        } else if gap_reservation(summary).or(slips(summary)).is_some() {
-            Self::Fair
-        } else {
+        } else if reservations(summary).is_empty() {
             Self::Good
+        } else {
+            Self::Fair
         }
     }
 }

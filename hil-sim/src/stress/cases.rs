@@ -16,24 +16,14 @@ use crate::plant::ring::RingParameters;
 pub(super) const RADIUS_MM: f64 = 25.0;
 const WIDTH_MM: f64 = 28.0;
 
-/// Range of a parameter, and how it is filled.
-#[derive(Clone, Copy, Debug)]
-enum Range {
-    /// Evenly.
-    Even(f64, f64),
-    /// Evenly in the logarithm.
-    Decades(f64, f64),
+/// The value at this part of a range that is filled evenly.
+fn even((low, high): (f64, f64), part: f64) -> f64 {
+    low + part * (high - low)
 }
 
-impl Range {
-    /// The value at this part of the range.
-    fn at(self, part: f64) -> f64 {
-        match self {
-            Self::Even(low, high) => low + part * (high - low),
-            Self::Decades(low, high) if part >= 1.0 => low.max(high),
-            Self::Decades(low, high) => low * (high / low).powf(part),
-        }
-    }
+/// The value at this part of a range that is filled evenly in the logarithm.
+fn decades((low, high): (f64, f64), part: f64) -> f64 {
+    if part >= 1.0 { high } else { low * (high / low).powf(part) }
 }
 
 /// Parameters whose ends are all combined as corners.
@@ -199,27 +189,26 @@ fn corner(bits: usize) -> StressCase {
 
 /// The case at these parts of the ranges.
 fn of(parts: &[f64; DIMENSIONS]) -> StressCase {
-    use Range::{Decades, Even};
     let [k, s, tau, dt, ratio, v, h, mu, preload, load, arm, course, phase] = *parts;
-    let mass_ratio = Decades(1e-3, 1e3).at(ratio);
-    let (stiffness, step_mm) = (Decades(1e6, 1e12).at(k), Even(0.0, 20.0).at(h));
+    let mass_ratio = decades((1e-3, 1e3), ratio);
+    let (stiffness, step_mm) = (decades((1e6, 1e12), k), even((0.0, 20.0), h));
     let carried_n = carries(stiffness, step_mm);
     let mut case = StressCase {
         index: 0,
         k_inf_pa_per_m: stiffness,
         // A fifth of the treads is without damping.
-        stiffening: Decades(1.0, 100.0).at((1.25 * s - 0.25).max(0.0)),
-        tau_s: Decades(1e-6, 1e3).at(tau),
-        dt_s: Decades(1e-6, 20e-3).at(dt),
+        stiffening: decades((1.0, 100.0), (1.25 * s - 0.25).max(0.0)),
+        tau_s: decades((1e-6, 1e3), tau),
+        dt_s: decades((1e-6, 20e-3), dt),
         mass_ratio,
         // Both masses move away from 40 kg and 1 kg by half of the ratio's decades.
         mass_kg: 6.0 * mass_ratio.sqrt(),
         // Cubed, so that slow runs have their share.
-        speed_mm_s: Even(0.0, 2000.0).at(v * v * v),
+        speed_mm_s: even((0.0, 2000.0), v * v * v),
         step_mm,
-        mu: Even(0.0, 3.0).at(mu),
-        preload_n: Decades(5.0, 150.0).at(preload).min(PARTS.0 * carried_n),
-        load_n: Even(0.0, 60.0).at(load * load).min(PARTS.2 * carried_n),
+        mu: even((0.0, 3.0), mu),
+        preload_n: decades((5.0, 150.0), preload).min(PARTS.0 * carried_n),
+        load_n: even((0.0, 60.0), load * load).min(PARTS.2 * carried_n),
         coupling: [1.0, 1.0, 0.0, 0.0, 0.0, -1.0][((arm * 6.0) as usize).min(5)],
         course: Course::ALL[((course * 5.0) as usize).min(4)],
         spring_n_per_mm: SPRING.min(PARTS.1 * carried_n / step_mm.max(1.0)),

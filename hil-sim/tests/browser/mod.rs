@@ -3,12 +3,11 @@
 mod chromium;
 
 use std::io::Write;
-use std::path::Path;
 
 use hil_sim::testing::long;
 use serde_json::json;
 
-use crate::cli::{code, rig_in, stderr};
+use crate::cli::{ends_with, folder, good_in};
 use chromium::Browser;
 
 /// A browser, if the long samples are wanted and this machine has one.
@@ -28,12 +27,6 @@ fn any_browser() -> Option<Browser> {
         );
     }
     program.map(|program| Browser::start(&program))
-}
-
-/// Runs the command, which must end with this code.
-fn run(expected: i32, at: &Path, arguments: &[&str]) {
-    let output = rig_in(at, arguments);
-    assert_eq!(code(&output), expected, "{arguments:?}: {}", stderr(&output));
 }
 
 /// Where each cursor of the shown plots over time is, less where the slider's instant belongs,
@@ -69,11 +62,11 @@ const RANGES: &str = "[...document.querySelectorAll('.time .data')] \
 #[test]
 fn every_plot_shows_the_time_of_the_pointer_and_they_zoom_together() {
     let Some(mut browser) = any_browser() else { return };
-    let directory = tempfile::tempdir().unwrap();
-    run(0, directory.path(), &["deploy", "--out", "run"]);
-    let summary = std::fs::read(directory.path().join("run/summary.json")).unwrap();
+    let at = &folder();
+    good_in(at, &["deploy", "--out", "run"]);
+    let summary = std::fs::read(at.join("run/summary.json")).unwrap();
     let summary: serde_json::Value = serde_json::from_slice(&summary).unwrap();
-    browser.open(&directory.path().join("run/report.html"), 1400);
+    browser.open(&at.join("run/report.html"), 1400);
     let times = "[...document.querySelectorAll('figure')].filter((f) => f.querySelector('output')) \
                  .map((f) => f.querySelector('output').textContent)";
     // In a plot of the run, and in one of a crossing, whose axis has another zero.
@@ -141,9 +134,9 @@ fn scrub(browser: &mut Browser, part: f64) {
 #[test]
 fn the_page_of_a_run_moves_and_its_cursors_follow() {
     let Some(mut browser) = browser() else { return };
-    let directory = tempfile::tempdir().unwrap();
-    run(0, directory.path(), &["deploy", "--out", "run"]);
-    browser.open(&directory.path().join("run/report.html"), 1400);
+    let at = &folder();
+    good_in(at, &["deploy", "--out", "run"]);
+    browser.open(&at.join("run/report.html"), 1400);
 
     // The animation moves, and ends with its crossing.
     let turned = "document.getElementById('wheel').getAttribute('transform')";
@@ -207,15 +200,14 @@ const CONTRAST: &str = "(() => { \
 #[test]
 fn every_page_fits_a_phone_a_zoomed_window_and_a_dark_room() {
     let Some(mut browser) = browser() else { return };
-    let directory = tempfile::tempdir().unwrap();
-    let at = directory.path();
-    run(0, at, &["deploy", "--out", "a"]);
+    let at = &folder();
+    good_in(at, &["deploy", "--out", "a"]);
     let slips = ["deploy", "--set", "plant.mu=0.7", "--controller", "constant", "--out", "b"];
-    run(1, at, &slips);
-    run(0, at, &["capture", "--out", "c"]);
-    run(0, at, &["report", "c/log.mcap", "--out", "captured.html"]);
-    run(0, at, &["report", "a/log.mcap", "b/log.mcap", "--out", "both.html"]);
-    run(0, at, &["montecarlo", "-n", "5", "--table", "runs.html"]);
+    ends_with(1, at, &slips);
+    good_in(at, &["capture", "--out", "c"]);
+    good_in(at, &["report", "c/log.mcap", "--out", "captured.html"]);
+    good_in(at, &["report", "a/log.mcap", "b/log.mcap", "--out", "both.html"]);
+    good_in(at, &["montecarlo", "-n", "5", "--table", "runs.html"]);
     for page in ["a/report.html", "b/report.html", "captured.html", "both.html", "runs.html"] {
         for (width, scale) in [(1400, 1.0), (700, 2.0), (400, 1.0)] {
             browser.open(&at.join(page), width);
@@ -242,10 +234,10 @@ fn every_page_fits_a_phone_a_zoomed_window_and_a_dark_room() {
 #[test]
 fn without_its_script_the_page_prints_two_still_pictures() {
     let Some(mut browser) = browser() else { return };
-    let directory = tempfile::tempdir().unwrap();
-    run(0, directory.path(), &["deploy", "--out", "run"]);
+    let at = &folder();
+    good_in(at, &["deploy", "--out", "run"]);
     browser.call("Emulation.setScriptExecutionDisabled", &json!({ "value": true }));
-    browser.open(&directory.path().join("run/report.html"), 1400);
+    browser.open(&at.join("run/report.html"), 1400);
     let shown = |what: &str| {
         format!(
             "[...document.querySelectorAll('{what}')] \

@@ -8,41 +8,33 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
+use super::{at_end, number};
 use crate::common::DIRECTIONS;
 
-/// Keys of sensors, pre-tightener and drive with their least and largest value. Load, friction and
-/// tread may ask for more than the rig can give, which it says.
-const ENDS: [(&str, f64, f64); 20] = [
-    ("rig.step_tolerance_mm", 0.1, 5.0),
-    ("preload.cruise_n", 5.0, 180.0),
-    ("preload.limit_n", 5.0, 180.0),
-    ("preload.spring_n_per_mm", 0.1, 20.0),
-    ("preload.slew_n_per_s", 1.0, 500.0),
-    ("preload.delay_s", 0.0, 0.25),
-    ("preload.lag_s", 0.005, 1.0),
-    ("drive.no_load_speed_mm_s", 5.0, 300.0),
-    ("drive.stall_force_n", 5.0, 5000.0),
-    ("drive.force_limit_n", 5.0, 1000.0),
-    ("drive.reflected_mass_kg", 0.1, 1000.0),
-    ("drive.cruise_speed_mm_s", 3.0, 100.0),
-    ("drive.min_crossing_speed_mm_s", 0.5, 20.0),
-    ("drive.acceleration_mm_s2", 5.0, 2000.0),
-    ("drive.jerk_mm_s3", 50.0, 30_000.0),
-    ("sense.encoder_counts", 1024.0, 65_536.0),
-    ("sense.preload_full_scale_n", 20.0, 2000.0),
-    ("sense.preload_error", 0.0, 0.3),
-    ("sense.tread_full_scale_mm", 0.5, 50.0),
-    ("control.adaptation_range", 0.0, 0.9),
+/// Keys of sensors, pre-tightener and drive. Load, friction and tread may ask for more than the rig
+/// can give, which it says.
+const KEYS: [&str; 20] = [
+    "rig.step_tolerance_mm",
+    "preload.cruise_n",
+    "preload.limit_n",
+    "preload.spring_n_per_mm",
+    "preload.slew_n_per_s",
+    "preload.delay_s",
+    "preload.lag_s",
+    "drive.no_load_speed_mm_s",
+    "drive.stall_force_n",
+    "drive.force_limit_n",
+    "drive.reflected_mass_kg",
+    "drive.cruise_speed_mm_s",
+    "drive.min_crossing_speed_mm_s",
+    "drive.acceleration_mm_s2",
+    "drive.jerk_mm_s3",
+    "sense.encoder_counts",
+    "sense.preload_full_scale_n",
+    "sense.preload_error",
+    "sense.tread_full_scale_mm",
+    "control.adaptation_range",
 ];
-
-fn set(base: &Scenario, key: &str, value: f64) -> Result<Scenario, ScenarioError> {
-    base.clone().with(&[format!("{key}={value}")])
-}
-
-fn value(base: &Scenario, key: &str) -> f64 {
-    let info = base.keys().into_iter().find(|info| info.key == key).expect("a key");
-    info.value.to_string().parse().expect("a number")
-}
 
 /// What is wrong with an accepted rig, if something is.
 fn fails(case: &Scenario, seed: u64) -> Option<String> {
@@ -67,30 +59,17 @@ fn well_refused(error: &ScenarioError, key: &str) -> Option<String> {
 #[test]
 fn a_rig_at_the_bound_of_any_key_runs() {
     let presets: &[&str] = if long() { &["prototype", "fe"] } else { &["prototype"] };
-    let cases = presets.iter().flat_map(|preset| ENDS.map(|ends| (*preset, ends)));
-    let cases: Vec<_> = cases.collect();
-    let wrong: Vec<String> = cases
-        .into_par_iter()
-        .flat_map_iter(|(preset, (key, least, most))| [least, most].map(|end| (preset, key, end)))
-        .filter_map(|(preset, key, end)| {
-            let base = Scenario::named(preset).expect("a preset");
-            let (mut good, mut bad) = (value(&base, key), end);
-            match set(&base, key, end) {
-                Ok(_) => good = end,
-                Err(error) => {
-                    if let Some(text) = well_refused(&error, key) {
-                        return Some(text);
-                    }
-                    for _ in 0..10 {
-                        let middle = 0.5 * (good + bad);
-                        let kept = set(&base, key, middle).is_ok();
-                        *(if kept { &mut good } else { &mut bad }) = middle;
-                    }
-                }
-            }
-            fails(&set(&base, key, good).expect("accepted"), 0)
+    let cases: Vec<_> = presets.iter().flat_map(|preset| KEYS.map(|key| (*preset, key))).collect();
+    let fails = |(preset, key): (&str, &str)| {
+        let base = Scenario::named(preset).expect("a preset");
+        let (_, least, most) = number(&base, key);
+        [least, most].map(|end| {
+            let (nearest, refusal) = at_end(&base, key, end);
+            let ill = refusal.and_then(|refusal| well_refused(&refusal, key));
+            ill.or_else(|| fails(&nearest, 0))
         })
-        .collect();
+    };
+    let wrong: Vec<String> = cases.into_par_iter().flat_map_iter(fails).flatten().collect();
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
@@ -105,10 +84,11 @@ fn a_rig_around_a_preset_runs_or_is_refused() {
             let base = Scenario::named(preset).expect("a preset");
             let sets: Vec<String> = (0..random.random_range(1..=4))
                 .map(|_| {
-                    let (key, least, most) = ENDS[random.random_range(0..ENDS.len())];
+                    let key = KEYS[random.random_range(0..KEYS.len())];
+                    let (value, least, most) = number(&base, key);
                     // Evenly in the logarithm from half to twice.
                     let factor = f64::exp2(2.0 * random.random::<f64>() - 1.0);
-                    format!("{key}={}", (value(&base, key) * factor).clamp(least, most))
+                    format!("{key}={}", (value * factor).clamp(least, most))
                 })
                 .collect();
             let keys = sets.iter().filter_map(|set| set.split('=').next());

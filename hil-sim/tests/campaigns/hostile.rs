@@ -4,8 +4,10 @@
 //!
 //! Overflow is checked in this build: a sum that wraps by mistake panics.
 
-use super::parity;
+use super::{at_end, parity};
+use crate::common::RIGS;
 use crate::common::echo::Echo;
+use hil_sim::scenario::{Scenario, ScenarioError};
 use interstage::model::history::History;
 use interstage::model::{Learned, Plan, PlanRequest, Planner, Review};
 use interstage::rig::Rig;
@@ -39,30 +41,25 @@ const FEEDS: [Feed; 6] = {
     [Least, Largest, Alternating, Jumping, Garbage, Plans]
 };
 
+/// Sections of the keys that the controller is built from.
+const SECTIONS: [&str; 7] = ["rig", "tread", "plant", "preload", "drive", "sense", "control"];
+
 /// Requests at the corners of their values, a rig.
 const REQUESTS: usize = 40;
 
 #[test]
 fn nothing_panics_or_switches_a_bridge_on_whatever_comes_in() {
     let ticks = if hil_sim::testing::long() { 20_000 } else { 4000 };
-    let (mut rigs, mut refused) = (Vec::new(), Vec::new());
-    for (name, rig) in corner_rigs() {
-        match (Controller::try_build(&rig), Planner::try_build(&rig)) {
-            (Ok(controller), Ok(planner)) => rigs.push((name, controller, planner)),
-            (Err(error), _) | (_, Err(error)) => {
-                refused.push(format!("{name}: {error}"));
-            }
-        }
-    }
-    assert!(rigs.len() > 90, "{refused:#?}");
-    // A refusal says what was expected instead.
-    assert!(refused.iter().all(|text| text.contains("expected")), "{refused:#?}");
-    rigs.par_iter().for_each(|(name, controller, planner)| {
+    let rigs = corner_rigs();
+    assert!(rigs.len() > 150, "{}", rigs.len());
+    rigs.par_iter().for_each(|(name, rig)| {
+        let controller = Controller::try_build(rig).unwrap_or_else(|why| panic!("{name}: {why}"));
+        let planner = Planner::try_build(rig).unwrap_or_else(|why| panic!("{name}: {why}"));
         for feed in FEEDS {
-            let broken = fed(controller, planner, feed, ticks, 1);
+            let broken = fed(&controller, &planner, feed, ticks, 1);
             assert_eq!(broken, None, "{name}, {feed:?}");
         }
-        ask(planner, 1);
+        ask(&planner, 1);
     });
 }
 
@@ -252,58 +249,27 @@ fn ask(planner: &Planner, seed: u64) {
     }
 }
 
-/// A parameter and its ends.
-type Ends = (&'static str, fn(&mut Rig) -> &mut f64, f64, f64);
-
-/// The parameters and their ends, as the rig's validation has them.
-const ENDS: [Ends; 32] = [
-    ("rig.wheel_radius_mm", |r| &mut r.rig.wheel_radius_mm, 10.0, 30.0),
-    ("rig.wheel_wear_mm", |r| &mut r.rig.wheel_wear_mm, 0.0, 0.2),
-    ("rig.wheel_width_mm", |r| &mut r.rig.wheel_width_mm, 1.0, 200.0),
-    ("rig.step_height_mm", |r| &mut r.rig.step_height_mm, 1.5, 8.0),
-    ("rig.step_tolerance_mm", |r| &mut r.rig.step_tolerance_mm, 0.1, 1.0),
-    ("rig.wall_radius_mm", |r| &mut r.rig.wall_radius_mm, 70.0, 170.0),
-    ("rig.arm_length_mm", |r| &mut r.rig.arm_length_mm, 120.0, 900.0),
-    ("tread.k_inf_pa_per_m", |r| &mut r.tread.k_inf_pa_per_m, 1e7, 5e10),
-    ("tread.stiffening", |r| &mut r.tread.stiffening, 1.0, 20.0),
-    ("tread.tau_s", |r| &mut r.tread.tau_s, 1e-3, 10.0),
-    ("plant.mu", |r| &mut r.plant.mu, 0.0, 3.0),
-    ("plant.top_load_n", |r| &mut r.plant.top_load_n, 0.0, 200.0),
-    ("plant.moved_mass_kg", |r| &mut r.plant.moved_mass_kg, 0.01, 100.0),
-    ("plant.arm_coupling", |r| &mut r.plant.arm_coupling, -1.0, 1.0),
-    ("preload.cruise_n", |r| &mut r.preload.cruise_n, 5.0, 48.0),
-    ("preload.limit_n", |r| &mut r.preload.limit_n, 35.0, 180.0),
-    ("preload.spring_n_per_mm", |r| &mut r.preload.spring_n_per_mm, 0.1, 20.0),
-    ("preload.slew_n_per_s", |r| &mut r.preload.slew_n_per_s, 1.0, 500.0),
-    ("preload.delay_s", |r| &mut r.preload.delay_s, 0.0, 0.25),
-    ("preload.lag_s", |r| &mut r.preload.lag_s, 0.005, 1.0),
-    ("drive.no_load_speed_mm_s", |r| &mut r.drive.no_load_speed_mm_s, 37.0, 300.0),
-    ("drive.stall_force_n", |r| &mut r.drive.stall_force_n, 5.0, 5000.0),
-    ("drive.force_limit_n", |r| &mut r.drive.force_limit_n, 5.0, 1000.0),
-    ("drive.reflected_mass_kg", |r| &mut r.drive.reflected_mass_kg, 0.1, 1000.0),
-    ("drive.cruise_speed_mm_s", |r| &mut r.drive.cruise_speed_mm_s, 5.0, 50.0),
-    ("drive.acceleration_mm_s2", |r| &mut r.drive.acceleration_mm_s2, 5.0, 2000.0),
-    ("drive.jerk_mm_s3", |r| &mut r.drive.jerk_mm_s3, 50.0, 30_000.0),
-    ("drive.ripple_pitch_mm", |r| &mut r.drive.ripple_pitch_mm, 0.01, 100.0),
-    ("sense.encoder_counts", |r| &mut r.sense.encoder_counts, 1024.0, 65_536.0),
-    ("sense.preload_full_scale_n", |r| &mut r.sense.preload_full_scale_n, 60.0, 2000.0),
-    ("sense.tread_full_scale_mm", |r| &mut r.sense.tread_full_scale_mm, 0.5, 50.0),
-    ("control.gap_ref_mm", |r| &mut r.control.gap_ref_mm, 0.0, 10.0),
-];
-
-/// Both presets, and each with each parameter at each of its ends.
+/// Both presets, and each with each number of the rig at each end of its range, or as near to it as
+/// the others take.
 fn corner_rigs() -> Vec<(String, Rig)> {
-    let mut rigs = Vec::new();
-    for preset in ["prototype", "fe"] {
-        let Some(base) = Rig::named(preset) else { continue };
-        rigs.push((preset.to_owned(), base.clone()));
-        for (key, at, low, high) in ENDS {
-            for value in [low, high] {
-                let mut rig = base.clone();
-                *at(&mut rig) = value;
-                rigs.push((format!("{preset}, {key} = {value}"), rig));
-            }
-        }
-    }
-    rigs
+    let one = |preset: &&str| {
+        let base = Scenario::named(preset).expect("a preset");
+        let numbers = base.keys().into_iter().filter(|info| {
+            let section = info.key.split('.').next().unwrap_or_default();
+            SECTIONS.contains(&section)
+        });
+        let ends = numbers.filter_map(|info| Some((info.key, info.range?)));
+        let corners = ends.flat_map(|(key, (least, most))| {
+            [least, most].map(|end| {
+                let (nearest, refusal) = at_end(&base, &key, end);
+                // A refusal says what was expected instead.
+                let says = |why: &ScenarioError| why.to_string().contains("expect");
+                assert!(refusal.iter().all(says), "{refusal:?}");
+                (format!("{preset}, {key} = {end}"), nearest.rig)
+            })
+        });
+        let corners: Vec<_> = corners.collect();
+        std::iter::once((preset.to_string(), base.rig)).chain(corners)
+    };
+    RIGS.iter().flat_map(one).collect()
 }

@@ -6,7 +6,7 @@ use std::process::Output;
 use serde_json::Value;
 
 use super::{
-    code, good, good_in, number, object, refused, refused_in, rig, rig_in, stderr, stdout,
+    code, folder, good, good_in, number, object, refused, refused_in, rig, rig_in, stderr, stdout,
 };
 
 fn campaign(more: &[&str]) -> Value {
@@ -14,7 +14,7 @@ fn campaign(more: &[&str]) -> Value {
 }
 
 #[test]
-fn five_rigs_complete_with_every_key_and_the_shards_are_the_whole() {
+fn five_rigs_complete_with_every_key() {
     let all = campaign(&["-n", "5"]);
     assert_eq!((&all["runs"], &all["completed"]), (&Value::from(5), &Value::from(5)));
     assert!((1..=5).contains(&all["worst_gap_seed"].as_u64().unwrap()));
@@ -24,14 +24,6 @@ fn five_rigs_complete_with_every_key_and_the_shards_are_the_whole() {
     assert!(number(&all["moving_s"], "max") < number(&all["duration_s"], "max"));
     assert!(number(&all["gap_over_ref"], "p95") > 0.5);
     assert!(all["lead_time_s"]["seed"].is_u64() && all["slip_margin"]["seed"].is_u64());
-    let shards = ["1/2", "2/2"].map(|shard| campaign(&["-n", "5", "--shard", shard]));
-    let sum = |key: &str| shards.iter().map(|shard| number(shard, key)).sum::<f64>();
-    for key in ["runs", "completed", "slip_events"] {
-        assert_eq!(sum(key), number(&all, key), "{key}");
-    }
-    assert_eq!(number(&shards[0], "runs"), 3.0);
-    let worst = shards.iter().map(|shard| number(shard, "worst_gap_mm")).fold(0.0, f64::max);
-    assert_eq!(worst, number(&all, "worst_gap_mm"));
 }
 
 #[test]
@@ -65,18 +57,6 @@ fn rigs_that_do_not_complete_are_named() {
 }
 
 #[test]
-fn the_parts_of_a_fault_campaign_are_the_whole() {
-    let some = ["faults", "--json", "-n", "2", "--only", "runaway", "--only", "tick"];
-    let all = good(&some);
-    assert_eq!((&all["undetected"], &all["unsafe"]), (&0.into(), &0.into()));
-    let lines = |run: &Value| run["matrix"].as_array().expect("lines").clone();
-    let [first, second] =
-        ["1/2", "2/2"].map(|part| lines(&good(&[&some[..], &["--shard", part]].concat())));
-    assert_eq!((first.len(), second.len()), (2, 1));
-    assert_eq!([first[0].clone(), second[0].clone(), first[1].clone()].to_vec(), lines(&all));
-}
-
-#[test]
 fn a_wide_campaign_names_what_it_drew_and_where_it_ended() {
     let output = rig(&["montecarlo", "-n", "2", "--wide", "--json"]);
     let all: Value = serde_json::from_str(stdout(&output)).expect("one object");
@@ -102,14 +82,9 @@ fn the_comparison_has_every_strategy_and_the_oracle() {
     let entries = compared["entries"].as_array().unwrap();
     let names: Vec<&str> = entries.iter().map(|e| e["controller"].as_str().unwrap()).collect();
     assert_eq!(names, ["scheduled", "constant", "limit", "reactive", "oracle"]);
-    for entry in entries {
-        assert!(number(entry, "duration_s") > number(entry, "moving_s"), "{entry}");
-        assert!(number(entry, "worst_gap_mm") > 1.0 && number(entry, "least_slip_margin") > 0.0);
-        assert_eq!((&entry["slip_events"], &entry["incomplete"]), (&0.into(), &0.into()));
+    for key in ["duration_s", "moving_s", "worst_gap_mm", "least_slip_margin"] {
+        assert!(entries.iter().all(|entry| number(entry, key) > 0.0), "{key}");
     }
-    let [scheduled, .., oracle] = &entries[..] else { panic!("{compared}") };
-    assert!(number(oracle, "duration_s") < number(scheduled, "duration_s"));
-    assert!(number(oracle, "worst_gap_mm") <= number(scheduled, "worst_gap_mm"));
     let table = rig(&["compare", "-n", "1", "--no-oracle"]);
     let text = stdout(&table);
     assert!(text.contains("reactive") && !text.contains("oracle"), "{text}");
@@ -120,8 +95,8 @@ fn the_comparison_has_every_strategy_and_the_oracle() {
 
 #[test]
 fn the_envelope_writes_its_picture_and_every_key() {
-    let directory = tempfile::tempdir().unwrap();
-    let found = object(&good_in(directory.path(), &["envelope", "-n", "2x2", "--json"]));
+    let at = &folder();
+    let found = object(&good_in(at, &["envelope", "-n", "2x2", "--json"]));
     let grid = found["grid"].as_array().unwrap();
     assert_eq!(grid.len(), 2 * 2 * 2 * 4);
     for cell in grid {
@@ -132,6 +107,21 @@ fn the_envelope_writes_its_picture_and_every_key() {
         assert!(number(cell, "slip_mm") >= 0.0);
         assert_eq!(cell["duration_s"].is_number(), completed, "{cell}");
     }
+    let scheduled = |known: bool, friction: f64, load_n: f64| {
+        let at = |cell: &&Value| {
+            (number(cell, "friction"), number(cell, "load_n")) == (friction, load_n)
+                && (&cell["known"], &cell["controller"]) == (&known.into(), &"scheduled".into())
+        };
+        grid.iter().find(at).expect("a cell of the grid")
+    };
+    let is_good = |cell: &Value| cell["completed"] == true && number(cell, "slip_mm") <= 0.05;
+    for known in [true, false] {
+        // With much friction and no load; 30 N hold on no wheel with so little friction.
+        assert!(is_good(scheduled(known, 1.3, 0.0)) && !is_good(scheduled(known, 0.6, 30.0)));
+    }
+    // Knowing it changes the run.
+    let [known, unknown] = [true, false].map(|known| scheduled(known, 1.3, 0.0));
+    assert_ne!(known["duration_s"], unknown["duration_s"]);
     for controller in ["scheduled", "constant", "limit", "reactive"] {
         for part in ["known", "unknown"] {
             assert!((0.0..=1.0).contains(&number(&found["area"][controller], part)));
@@ -140,8 +130,10 @@ fn the_envelope_writes_its_picture_and_every_key() {
     let missing = found["not_contained"].as_array().unwrap();
     assert_eq!(found["scheduled_contains_all"], missing.is_empty());
     assert_eq!(found["files"], serde_json::json!(["out/envelope/envelope.svg"]));
-    let picture = directory.path().join("out/envelope/envelope.svg");
-    assert!(std::fs::read_to_string(picture).unwrap().contains("scheduled, known"));
+    let picture = std::fs::read_to_string(at.join("out/envelope/envelope.svg")).unwrap();
+    for text in ["scheduled, known", "reactive", "% of the grid; seconds", ">0.6</text>"] {
+        assert!(picture.contains(text), "{text}");
+    }
 }
 
 /// Runs both halves of a campaign into files, and what one machine prints of it.
@@ -168,8 +160,7 @@ fn merged_parts_are_what_one_machine_prints_to_the_bit() {
         "sweep --no-files --crossing --method fixed --key speed_mm_s=5,8,9",
         "compare -n 1 --no-oracle",
     ] {
-        let directory = tempfile::tempdir().unwrap();
-        let at = directory.path();
+        let at = &folder();
         let command: Vec<&str> = command.split(' ').collect();
         let [text, json] = halves(at, &command);
         let whole = rig_in(at, &command);
@@ -187,8 +178,7 @@ fn merged_parts_are_what_one_machine_prints_to_the_bit() {
 
 #[test]
 fn parts_that_do_not_fit_are_refused_and_a_missing_one_is_told() {
-    let directory = tempfile::tempdir().unwrap();
-    let at = directory.path();
+    let at = &folder();
     let run = ["montecarlo", "-n", "3", "--json", "--shard"];
     for (name, more) in
         [("a", &["1/3"][..]), ("b", &["2/3"]), ("other", &["2/3", "--set", "plant.mu=1.2"])]
@@ -210,8 +200,7 @@ fn parts_that_do_not_fit_are_refused_and_a_missing_one_is_told() {
 
 #[test]
 fn the_rows_of_a_campaign_are_written_as_a_table() {
-    let directory = tempfile::tempdir().unwrap();
-    let at = directory.path();
+    let at = &folder();
     let tables = ["--table", "runs.csv", "--table", "runs.html"];
     let output = rig_in(at, &[&["montecarlo", "-n", "2"][..], &tables].concat());
     assert!(

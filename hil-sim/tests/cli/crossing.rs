@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use super::{good, number, object, refused_in, rig, rig_in, stderr, stdout};
+use super::{folder, good, number, object, refused_in, rig, rig_in, stderr, stdout};
 
 /// A crossing on the study's rig.
 fn crossing(speed: f64, preload: f64, more: &[&str]) -> Value {
@@ -39,14 +39,14 @@ fn every_method_prints_the_same_keys_and_the_gap_that_the_ring_was_fitted_to() {
 
 #[test]
 fn along_a_course_that_is_constant_it_is_the_same_and_braking_late_the_gap_is_wider() {
-    let directory = tempfile::tempdir().expect("a directory");
+    let at = &folder();
     let course = |rows: &str| {
         let text = format!("x_mm,speed_mm_s,preload_n\n{rows}");
-        std::fs::write(directory.path().join("course.csv"), text).expect("written");
+        std::fs::write(at.join("course.csv"), text).expect("written");
     };
     let along = |method: &str| {
         let asked = ["crossing", "--json", "--driven", "--course", "course.csv"];
-        let output = rig_in(directory.path(), &[&asked[..], &["--method", method]].concat());
+        let output = rig_in(at, &[&asked[..], &["--method", method]].concat());
         number(&object(&output), "gap_mm")
     };
     for method in ["ring", "fixed"] {
@@ -62,7 +62,7 @@ fn along_a_course_that_is_constant_it_is_the_same_and_braking_late_the_gap_is_wi
     }
     course("-14,8,45\n-14,8,45\n");
     let names = &["course.csv: row 2: x_mm -14"];
-    refused_in(directory.path(), &["crossing", "--course", "course.csv"], names);
+    refused_in(at, &["crossing", "--course", "course.csv"], names);
 }
 
 #[test]

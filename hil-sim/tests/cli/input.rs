@@ -1,6 +1,6 @@
 //! What cannot be run as asked: exit code 2, one line that names it, no files.
 
-use super::{refused, refused_in};
+use super::{folder, refused, refused_in};
 
 #[test]
 fn parameters_are_checked_before_anything_is_written() {
@@ -36,12 +36,15 @@ fn options_are_checked_by_name() {
         ("deploy --seed 1.5", &["--seed", "1.5", "a whole number, 0 or more"]),
         ("deploy --seed 18446744073709551615", &["--seed", "at most 9223372036854775807"]),
         ("deploy --target moon", &["--target <TARGET>", "moon", "sil, board, probe"]),
-        ("deploy --sead 1", &["--sead"]),
+        ("deploy --sead 1", &["--sead", "--seed"]),
         ("deploy --out a --no-files", &["--out", "--no-files"]),
         ("deploy missing.toml", &["missing.toml"]),
         ("deploy --scenario missing.toml", &["missing.toml"]),
         ("fly", &["fly"]),
-        ("crossing --speed-mm-s 5", &["--preload-n"]),
+        (
+            "crossing --speed-mm-s 5",
+            &["error: the following required", " provided: --preload-n <P>"],
+        ),
         ("crossing --speed-mm-s 5 --preload-n 33 --method magic", &["--method", "ring, fixed"]),
         ("crossing --speed-mm-s 5 --preload-n 33 --set tread.tau_s=0", &["tread.tau_s"]),
         ("montecarlo -n 0", &["-n"]),
@@ -87,7 +90,7 @@ fn options_are_checked_by_name() {
 
 #[test]
 fn scenario_files_are_checked() {
-    let directory = tempfile::tempdir().unwrap();
+    let at = &folder();
     for (text, name) in [
         ("[tread\n", "line 1"),
         ("[tread]\nstiffness = 4\n", "tread.stiffness"),
@@ -95,32 +98,32 @@ fn scenario_files_are_checked() {
         ("preset = \"moon\"\n", "moon"),
         ("[rig]\nstep_positions_mm = [40, 18]\n", "rig.step_positions_mm"),
     ] {
-        std::fs::write(directory.path().join("bad.toml"), text).unwrap();
-        refused_in(directory.path(), &["deploy", "bad.toml"], &["bad.toml", name]);
+        std::fs::write(at.join("bad.toml"), text).unwrap();
+        refused_in(at, &["deploy", "bad.toml"], &["bad.toml", name]);
     }
-    std::fs::write(directory.path().join("bytes.toml"), [0xff, 0xfe, 0x00]).unwrap();
-    refused_in(directory.path(), &["deploy", "bytes.toml"], &["bytes.toml"]);
-    refused_in(directory.path(), &["deploy", "."], &["cannot be read"]);
-    assert!(!directory.path().join("out").exists());
+    std::fs::write(at.join("bytes.toml"), [0xff, 0xfe, 0x00]).unwrap();
+    refused_in(at, &["deploy", "bytes.toml"], &["bytes.toml"]);
+    refused_in(at, &["deploy", "."], &["cannot be read"]);
+    assert!(!at.join("out").exists());
 }
 
 #[test]
 fn what_is_no_log_is_refused() {
-    let directory = tempfile::tempdir().unwrap();
-    std::fs::write(directory.path().join("log.mcap"), "hello").unwrap();
-    std::fs::write(directory.path().join("notes.csv"), "a,b\n1,2\n").unwrap();
-    refused_in(directory.path(), &["replay", "log.mcap"], &["no log"]);
-    refused_in(directory.path(), &["report", "log.mcap"], &["no log"]);
-    refused_in(directory.path(), &["identify", "notes.csv"], &["notes.csv: it holds no tick"]);
+    let at = &folder();
+    std::fs::write(at.join("log.mcap"), "hello").unwrap();
+    std::fs::write(at.join("notes.csv"), "a,b\n1,2\n").unwrap();
+    refused_in(at, &["replay", "log.mcap"], &["no log"]);
+    refused_in(at, &["report", "log.mcap"], &["no log"]);
+    refused_in(at, &["identify", "notes.csv"], &["notes.csv: it holds no tick"]);
 }
 
 #[test]
 fn a_directory_that_cannot_be_written_is_reported() {
-    let directory = tempfile::tempdir().unwrap();
-    std::fs::write(directory.path().join("taken"), "mine").unwrap();
-    refused_in(directory.path(), &["deploy", "--out", "taken"], &["--out taken"]);
-    refused_in(directory.path(), &["deploy", "--out", "taken/run"], &["taken/run"]);
-    assert_eq!(std::fs::read_to_string(directory.path().join("taken")).unwrap(), "mine");
+    let at = &folder();
+    std::fs::write(at.join("taken"), "mine").unwrap();
+    refused_in(at, &["deploy", "--out", "taken"], &["--out taken"]);
+    refused_in(at, &["deploy", "--out", "taken/run"], &["taken/run: cannot make"]);
+    assert_eq!(std::fs::read_to_string(at.join("taken")).unwrap(), "mine");
 }
 
 #[test]

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use serde_json::Value;
 
-use super::{code, good_in, json, number, object, refused_in, rig_in, stderr, stdout};
+use super::{ends_with, folder, good_in, json, number, object, refused_in, rig_in, stderr, stdout};
 
 /// Where a command wrote the file of this name.
 fn wrote(found: &Value, name: &str) -> PathBuf {
@@ -15,8 +15,7 @@ fn wrote(found: &Value, name: &str) -> PathBuf {
 
 #[test]
 fn folder_banner_and_summary_carry_overrides_draw_and_version() {
-    let directory = tempfile::tempdir().unwrap();
-    let at = directory.path();
+    let at = &folder();
     let arguments =
         ["deploy", "--seed", "3", "--set", "tread.tau_s=0.2", "--set", "preload.limit_n=52"];
     let output = good_in(at, &arguments);
@@ -38,8 +37,7 @@ fn folder_banner_and_summary_carry_overrides_draw_and_version() {
 
 #[test]
 fn another_run_keeps_its_folder() {
-    let directory = tempfile::tempdir().unwrap();
-    let at = directory.path();
+    let at = &folder();
     let file = at.join("bench.toml");
     std::fs::write(&file, "[tread]\ntau_s = 0.2\n").unwrap();
     let first = object(&good_in(at, &["deploy", "bench.toml", "--json"]));
@@ -61,8 +59,7 @@ fn another_run_keeps_its_folder() {
 
 #[test]
 fn comparisons_captures_and_identifications_keep_what_is_there() {
-    let directory = tempfile::tempdir().unwrap();
-    let at = directory.path();
+    let at = &folder();
     for (seed, name) in [("1", "a"), ("2", "b"), ("3", "c")] {
         good_in(at, &["deploy", "--seed", seed, "--out", name]);
     }
@@ -97,8 +94,7 @@ fn comparisons_captures_and_identifications_keep_what_is_there() {
 
 #[test]
 fn no_command_writes_over_what_it_reads() {
-    let directory = tempfile::tempdir().unwrap();
-    let at = directory.path();
+    let at = &folder();
     good_in(at, &["deploy", "--out", "run"]);
     std::fs::copy(at.join("run/log.mcap"), at.join("other.mcap")).unwrap();
     let log = std::fs::read(at.join("other.mcap")).unwrap();
@@ -139,20 +135,17 @@ fn no_command_writes_over_what_it_reads() {
 
 #[test]
 fn a_run_without_a_crossing_has_no_gap() {
-    let directory = tempfile::tempdir().unwrap();
-    let at = directory.path();
-    // The first step is a wall to a wheel without grip.
+    let at = &folder();
+    // The first step is a wall to a wheel without grip: the run does not complete.
     let ice = ["deploy", "--set", "plant.mu=0.05", "--out", "ice"];
-    let output = rig_in(at, &ice);
-    assert_eq!(code(&output), 1, "{}", stderr(&output));
+    let output = ends_with(1, at, &ice);
     let text = stdout(&output);
     assert!(text.contains("no crossing, so no gap"), "{text}");
     assert!(!text.contains("below the reference"), "{text}");
     let summary = json(&at.join("ice/summary.json"));
-    assert_eq!(
-        (&summary["max_gap_mm"], &summary["crossings"]),
-        (&Value::Null, &Value::Array(vec![]))
-    );
+    assert_eq!(summary["completed"], false);
+    assert_eq!(summary["max_gap_mm"], Value::Null);
+    assert_eq!(summary["crossings"], Value::Array(vec![]));
     // The log gives the same back.
     let read = object(&rig_in(at, &["report", "ice/log.mcap", "--json"]));
     assert_eq!(read["trace_digest"], summary["trace_digest"]);

@@ -5,7 +5,7 @@ use std::process::{Command, Output};
 
 use serde_json::Value;
 
-use super::{code, good, good_in, number, rig, stderr, stdout};
+use super::{code, folder, good, good_in, number, rig, stderr, stdout};
 
 /// The key of this name.
 fn of<'a>(keys: &'a [Value], name: &str) -> &'a Value {
@@ -68,16 +68,12 @@ fn a_shell_completes_verbs_and_options_and_help_takes_a_verb() {
 fn help_lists_the_verbs_and_is_no_error() {
     let output = rig(&["--help"]);
     assert_eq!(code(&output), 0);
-    for verb in ["modes", "bench", "paper"] {
+    let verbs = "modes bench paper deploy crossing compare envelope montecarlo keys test";
+    for verb in verbs.split(' ') {
         assert!(stdout(&output).contains(&format!("\n  {verb} ")), "{verb}");
-    }
-    for verb in ["deploy", "crossing", "compare", "envelope", "montecarlo", "keys", "test"] {
-        assert!(stdout(&output).contains(&format!("\n  {verb} ")), "{verb}");
-        let help = rig(&[verb, "--help"]);
-        assert_eq!(code(&help), 0, "{verb}");
-        assert!(stdout(&help).contains("Usage: cargo rig"), "{verb}");
     }
     let text = stdout(&rig(&["deploy", "--help"])).to_owned();
+    assert!(text.contains("Usage: cargo rig deploy"), "{text}");
     assert!(text.contains("board") && text.contains("probe"), "{text}");
     assert!(stdout(&rig(&["--version"])).starts_with("rig "));
 }
@@ -93,19 +89,14 @@ fn program(script: &str) -> (tempfile::TempDir, PathBuf) {
     (directory, path)
 }
 
-/// A program in the place of cargo, which has built a program, and compiled it just now or not.
-#[cfg(unix)]
-fn cargo_that(fresh: bool) -> (tempfile::TempDir, PathBuf) {
-    program(&format!(
-        r#"echo '{{"reason":"compiler-artifact","target":{{"name":"rig-study"}},"executable":"/bin/true","fresh":{fresh}}}'"#
-    ))
-}
-
 #[cfg(unix)]
 #[test]
 fn a_build_is_announced_only_when_something_is_built() {
     for (fresh, said) in [(true, ""), (false, "building the study, once: up to some minutes\n")] {
-        let (_directory, cargo) = cargo_that(fresh);
+        // In the place of cargo: it has built a program, and compiled it just now or not.
+        let (_directory, cargo) = program(&format!(
+            r#"echo '{{"reason":"compiler-artifact","target":{{"name":"rig-study"}},"executable":"/bin/true","fresh":{fresh}}}'"#
+        ));
         let mut rig = Command::new(env!("CARGO_BIN_EXE_rig"));
         let output = rig.env("CARGO", cargo).arg("modes").output().expect("the command starts");
         assert_eq!((code(&output), &*stderr(&output)), (0, said));
@@ -155,14 +146,9 @@ fn the_image_is_flashed_and_read_back_and_only_the_text_log_is_shown() {
 
 #[cfg(unix)]
 #[test]
-fn the_exit_code_is_that_of_probe_rs() {
+fn probe_rs_has_to_be_there_and_new_enough_and_gives_the_exit_code() {
     let (_directory, probe_rs) = stand_in("probe-rs 1.0.0", "exit 1");
     assert_eq!(code(&flash_by(&probe_rs, &[])), 1);
-}
-
-#[cfg(unix)]
-#[test]
-fn probe_rs_has_to_be_there_and_new_enough() {
     let output = flash_by("/no/such/probe-rs".as_ref(), &[]);
     assert_eq!(code(&output), 2);
     let text = stderr(&output);
@@ -180,7 +166,7 @@ fn probe_rs_has_to_be_there_and_new_enough() {
 fn a_probe_is_looked_for_before_anything_is_built() {
     let found = r#"case $1 in list) echo "No debug probes were found.";; *) echo it ran;; esac"#;
     let (_directory, alone) = stand_in("probe-rs 0.33.0", found);
-    let directory = tempfile::tempdir().unwrap();
+    let at = &folder();
     for arguments in [
         &["flash"][..],
         &["deploy", "--target", "probe"],
@@ -190,7 +176,7 @@ fn a_probe_is_looked_for_before_anything_is_built() {
         &["bringup", "--yes"],
     ] {
         let output = Command::new(env!("CARGO_BIN_EXE_rig"))
-            .current_dir(directory.path())
+            .current_dir(&**at)
             .envs([("CARGO", "/nowhere/cargo"), ("PROBE_RS_PROBE", "dead:beef:none")])
             .env("PROBE_RS", &alone)
             .args(arguments)
@@ -199,14 +185,13 @@ fn a_probe_is_looked_for_before_anything_is_built() {
         let said = stderr(&output);
         assert_eq!((code(&output), stdout(&output)), (2, ""), "{arguments:?}: {said}");
         assert!(said.contains("no debug probe") && said.lines().count() == 1, "{said}");
-        assert!(super::is_empty(directory.path()), "{arguments:?} left files");
+        assert!(super::is_empty(at), "{arguments:?} left files");
     }
 }
 
 #[test]
 fn a_file_that_becomes_active_is_asked_for_what_no_default_knows() {
-    let directory = tempfile::tempdir().unwrap();
-    let at = directory.path();
+    let at = &folder();
     let restored = |file: &str, text: &str| {
         std::fs::write(at.join(file), text).unwrap();
         stderr(&good_in(at, &["params", "restore", file, "--file", "board.set"]))

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use super::{ends_with, good_in, number, object, refused_in, stdout};
+use super::{ends_with, folder, good_in, number, object, refused_in, stdout};
 
 /// The parameters that `rig identify` finds in a log: name; value, low and high end.
 fn identified(at: &Path, log: &str) -> Vec<(String, [Option<f64>; 3])> {
@@ -19,8 +19,7 @@ fn identified(at: &Path, log: &str) -> Vec<(String, [Option<f64>; 3])> {
 
 #[test]
 fn table_and_mcap_of_a_run_identify_the_same_rig() {
-    let directory = tempfile::tempdir().unwrap();
-    let at = directory.path();
+    let at = &folder();
     good_in(at, &["deploy", "--rig", "fe", "--seed", "2", "--out", "deployed"]);
     good_in(at, &["capture", "--rig", "fe", "--seed", "2", "--out", "captured"]);
     good_in(at, &["deploy", "--retract", "--out", "back"]);
@@ -34,8 +33,7 @@ fn table_and_mcap_of_a_run_identify_the_same_rig() {
 
 #[test]
 fn a_table_without_its_parameters_is_refused_until_they_are_given() {
-    let directory = tempfile::tempdir().unwrap();
-    let at = directory.path();
+    let at = &folder();
     good_in(at, &["deploy", "--rig", "fe", "--out", "run"]);
     std::fs::copy(at.join("run/log.csv"), at.join("alone.csv")).unwrap();
     refused_in(at, &["identify", "alone.csv"], &["alone.csv", "--rig"]);
@@ -48,8 +46,7 @@ fn a_table_without_its_parameters_is_refused_until_they_are_given() {
 
 #[test]
 fn a_captured_log_reports_what_was_measured_and_calls_nothing_true() {
-    let directory = tempfile::tempdir().unwrap();
-    let at = directory.path();
+    let at = &folder();
     good_in(at, &["capture", "--seed", "4", "--out", "."]);
     good_in(at, &["deploy", "--seed", "4", "--out", "real"]);
     let output = good_in(at, &["report", "log.mcap", "--out", "page.html"]);
@@ -66,6 +63,7 @@ fn a_captured_log_reports_what_was_measured_and_calls_nothing_true() {
     let measured = object(&good_in(at, &["report", "log.mcap", "--json"]));
     let truth = object(&good_in(at, &["report", "real/log.mcap", "--json"]));
     assert_eq!((&measured["measured"], &truth["measured"]), (&true.into(), &false.into()));
+    assert_eq!(measured["completed"], true);
     let off = number(&measured, "max_gap_mm") / number(&truth, "max_gap_mm") - 1.0;
     assert!(off != 0.0 && off.abs() < 0.05, "{off}");
     let off = number(&measured, "gap_ref_mm") / number(&truth, "gap_ref_mm") - 1.0;
@@ -80,8 +78,7 @@ fn cut(at: &Path, file: &str, tenths: usize, to: &str) {
 
 #[test]
 fn a_truncated_log_says_how_much_is_missing_and_ends_with_one() {
-    let directory = tempfile::tempdir().unwrap();
-    let at = directory.path();
+    let at = &folder();
     good_in(at, &["deploy", "--out", "run"]);
     good_in(at, &["capture", "--out", "caught"]);
     let ticks = Value::from(
@@ -114,19 +111,13 @@ fn a_truncated_log_says_how_much_is_missing_and_ends_with_one() {
     }
 }
 
-/// Every header and record of a table.
-fn table(path: &Path) -> (Vec<String>, Vec<csv::StringRecord>) {
-    let mut reader = csv::Reader::from_path(path).unwrap();
-    let head = reader.headers().unwrap().iter().map(str::to_owned).collect();
-    (head, reader.records().map(Result::unwrap).collect())
-}
-
 #[test]
 fn columns_have_no_sentinels_and_modes_and_stages_their_names() {
-    let directory = tempfile::tempdir().unwrap();
-    let at = directory.path();
+    let at = &folder();
     good_in(at, &["deploy", "--out", "."]);
-    let (head, rows) = table(&at.join("log.csv"));
+    let mut table = csv::Reader::from_path(at.join("log.csv")).unwrap();
+    let head = table.headers().unwrap().clone();
+    let rows: Vec<csv::StringRecord> = table.records().map(Result::unwrap).collect();
     let column = |name: &str| {
         let place = head.iter().position(|other| other == name).unwrap_or_else(|| panic!("{name}"));
         rows.iter().map(move |row| row[place].to_owned())

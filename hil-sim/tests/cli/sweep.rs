@@ -1,11 +1,10 @@
 //! `rig sweep`.
 
-use super::{ends_with, good_in, number, object, refused, rig_in, stdout};
+use super::{ends_with, folder, good_in, number, object, refused, rig_in, stdout};
 
 #[test]
 fn a_grid_of_deployments_has_rows_table_and_picture() {
-    let directory = tempfile::tempdir().unwrap();
-    let at = directory.path();
+    let at = &folder();
     let keys = ["--key", "tread.tau_s=0.05..0.2:3", "--key", "run.controller=scheduled,constant"];
     let found = object(&good_in(at, &[&["sweep", "--json"], &keys[..]].concat()));
     let rows = found["rows"].as_array().unwrap();
@@ -43,8 +42,7 @@ fn a_grid_of_deployments_has_rows_table_and_picture() {
 
 #[test]
 fn a_crossing_is_swept_as_it_is_computed_alone() {
-    let directory = tempfile::tempdir().unwrap();
-    let at = directory.path();
+    let at = &folder();
     let arguments = "sweep --crossing --method fixed --no-files --json --key speed_mm_s=5,8 \
                      --key preload_n=33.3,50";
     let found = object(&rig_in(at, &arguments.split_whitespace().collect::<Vec<_>>()));

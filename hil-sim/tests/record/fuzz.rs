@@ -83,8 +83,6 @@ fn logs() {
 
 #[test]
 fn mcap_files() {
-    let intact = Run::read(&data("deploy.mcap")).expect("a log");
-    assert!(intact.is_complete() && intact.rows.len() > 4500, "{} rows", intact.rows.len());
     fuzz("MCAP files", &[fixture("deploy.mcap")], 300, 4.0, read);
 }
 

@@ -48,11 +48,10 @@ fn recorded_runs_give_the_same_bits() {
         assert!(run.is_complete() && run.rows.len() > least, "{name}: {:?}", run.counts);
         assert_eq!(run.ledger.len(), 3, "{name}");
         let result = replay(&run, &Rig::prototype()).expect("a sound rig");
-        assert!(
-            result.is_equal(),
-            "{name}: {}",
-            result.difference.map_or_else(String::new, |difference| difference.to_string())
-        );
+        assert!(result.is_equal(), "{name}: {result:?}");
+        assert_eq!(result.ticks as usize, run.rows.len(), "{name}");
+        assert_eq!(result.events as usize, run.events.len(), "{name}");
+        assert!(result.plans.0 >= 4 && result.plans.1 == 0, "{name}: {:?}", result.plans);
     }
 }
 

@@ -68,6 +68,15 @@ fn marks(items: &[Item]) -> Vec<Mark> {
     items.iter().filter_map(mark).collect()
 }
 
+/// The bytes that the items have.
+fn bytes_of(items: &[Item]) -> Vec<u8> {
+    let bytes = |item: &Item| match item {
+        Item::Frame(bytes) => bytes.clone(),
+        _ => Vec::new(),
+    };
+    items.iter().flat_map(bytes).collect()
+}
+
 proptest! {
     #[test]
     fn bytes_come_in_any_pieces(cut in 1..700_usize) {
@@ -131,6 +140,7 @@ proptest! {
         prop_assert!(ticks(&items).into_iter().eq(0..400));
         prop_assert_eq!(counts.garbage_bytes as usize, garbage.len());
         prop_assert_eq!(counts.lost_frames, 0);
+        prop_assert_eq!(bytes_of(&items), bytes);
     }
 
     #[test]
