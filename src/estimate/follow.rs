@@ -126,13 +126,16 @@ impl Estimator {
         } else {
             self.watch.floor(&state.watch, state.direction, &seen)
         };
+        // Half of a patch hangs over an edge that is nearer.
+        let reach = self.corner().first_contact(state.direction);
+        let far = self.distance(state).is_none_or(|distance| distance > reach);
         Pulled {
             pressed: tick.pressed,
             load: tick.load,
             depth: seen.compression,
             ahead,
             floor,
-            level: !off && self.watch.is_level(&state.watch, state.direction, &seen),
+            level: far && self.watch.is_level(&state.watch, state.direction, &seen),
         }
     }
 
