@@ -171,13 +171,8 @@ impl<'a> Bench<'a> {
         self.end
     }
 
-    /// Whether the millisecond is over and [`Bench::close`] is due.
-    pub fn is_due(&mut self) -> bool {
-        self.machine.now() >= self.end()
-    }
-
     /// Closes a millisecond that is over: the plant makes its step.
-    pub fn close(&mut self) -> Result<(Passed, Vec<Line>), BoardError> {
+    fn close(&mut self) -> Result<(Passed, Vec<Line>), BoardError> {
         self.millisecond += 1;
         self.end = self.end() + STEP;
         let drives = self.drives();
@@ -286,6 +281,11 @@ impl<'a> Bench<'a> {
     /// When the scenario's faults struck and acted.
     pub(crate) fn fault_times(&self) -> FaultTimes {
         self.injector.as_ref().map(BoardInjector::times).unwrap_or_default()
+    }
+
+    /// Distance that the tread has turned, mm.
+    pub fn tread_mm(&self) -> f64 {
+        self.plant.truth().rotation_rad * self.plant.parameters().ring.radius_mm
     }
 
     /// Time since power came up, s.

@@ -29,14 +29,9 @@ impl<'a> Attended<'a> {
 
     /// The person, whose motions `asked` allows.
     pub fn person<O: Operator>(&self, asked: O) -> Person<'a, O> {
-        let tread_mm = tread_mm(&self.bench.borrow());
+        let tread_mm = self.bench.borrow().tread_mm();
         Person { bench: Rc::clone(&self.bench), asked, tread_mm }
     }
-}
-
-fn tread_mm(bench: &Bench<'_>) -> f64 {
-    let plant = &bench.plant;
-    plant.truth().rotation_rad * plant.parameters().ring.radius_mm
 }
 
 impl Port for Attended<'_> {
@@ -76,13 +71,13 @@ pub struct Person<'a, O> {
 impl<O: Operator> Operator for Person<'_, O> {
     fn confirm(&mut self, motion: &str) -> Result<(), BringupError> {
         self.asked.confirm(motion)?;
-        self.tread_mm = tread_mm(&self.bench.borrow());
+        self.tread_mm = self.bench.borrow().tread_mm();
         Ok(())
     }
 
     fn act(&mut self, action: Action) -> Result<(), BringupError> {
         let mut bench = self.bench.borrow_mut();
-        self.tread_mm = tread_mm(&bench);
+        self.tread_mm = bench.tread_mm();
         let wiring = &mut bench.wiring;
         match action {
             Action::SwitchOn => wiring.switched_off = false,
@@ -98,7 +93,7 @@ impl<O: Operator> Operator for Person<'_, O> {
 
     fn look(&mut self, question: Question) -> Result<Seen, BringupError> {
         let bench = self.bench.borrow();
-        let turned = tread_mm(&bench) - self.tread_mm;
+        let turned = bench.tread_mm() - self.tread_mm;
         let moved = if turned > SEEN_MM {
             Seen::Outwards
         } else if turned < -SEEN_MM {

@@ -9,7 +9,7 @@ mod restart;
 
 use interstage::fault::Limit;
 use interstage::params::{CompileError, slots};
-use interstage::restart::{CRASH_WORDS, DriveSnapshot, SNAPSHOT_WORDS, later};
+use interstage::restart::{CRASH_WORDS, DriveSnapshot, Restart, SNAPSHOT_WORDS, later};
 use interstage::supervise::{Command, Mode};
 use interstage::tick::{Entry, Event, Output};
 use interstage::units::Q16;
@@ -126,16 +126,26 @@ impl<'a> Board<'a> {
     /// Cause of the first restart, if the board reported every restart.
     fn restart(&self) -> Option<&'static str> {
         let (_, cause) = self.bench.machine.restarts().first()?;
-        let events = Run::of_stream(&self.frames).events;
-        let reports = events.iter().filter(|entry| matches!(entry.event, Event::Restart(_)));
         // The first power-up is reported as well.
-        (self.restart_lines > 0 || reports.count() > self.restarts).then_some(match cause {
-            Cause::Power => "reset by supply",
-            Cause::Pin => "reset by pin",
-            Cause::Software => "reset by software",
-            Cause::Watchdog => "reset by watchdog",
-        })
+        (self.restart_lines > 0 || reports(&self.frames).len() > self.restarts).then_some(
+            match cause {
+                Cause::Power => "reset by supply",
+                Cause::Pin => "reset by pin",
+                Cause::Software => "reset by software",
+                Cause::Watchdog => "reset by watchdog",
+            },
+        )
     }
+}
+
+/// The reports of starts in a binary log.
+pub fn reports(frames: &[u8]) -> Vec<Restart> {
+    let events = Run::of_stream(frames).events.into_iter();
+    let reports = events.filter_map(|entry| match entry.event {
+        Event::Restart(restart) => Some(restart),
+        _ => None,
+    });
+    reports.collect()
 }
 
 impl RunningRig for Board<'_> {

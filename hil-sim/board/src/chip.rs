@@ -214,7 +214,7 @@ impl Chip {
         if changed {
             self.settle_pins(now);
         }
-        self.settle_lines(now);
+        self.settle_lines();
     }
 
     pub fn lock_up(&mut self, now: u64) {
@@ -278,15 +278,15 @@ impl Chip {
     }
 
     /// A transfer is done, or `found` no memory or register at its address.
-    pub fn moved(&mut self, channel: usize, found: bool, now: u64) {
+    pub fn moved(&mut self, channel: usize, found: bool) {
         self.dma.moved(channel, found);
-        self.settle_lines(now);
+        self.settle_lines();
     }
 
     /// Updates pins, lines and deadlines after a change.
     pub(crate) fn settle(&mut self, now: u64) {
         self.settle_pins(now);
-        self.settle_lines(now);
+        self.settle_lines();
     }
 
     /// The same after an access to a register, for the lines that it can change.
@@ -304,12 +304,12 @@ impl Chip {
         } else if block.base == map::CORE && (0x100..0x500).contains(&offset) {
             // The interrupt controller updates itself.
         } else if write || by_reading {
-            self.settle_lines(now);
+            self.settle_lines();
         }
     }
 
     /// Updates interrupt lines and the next deadline.
-    fn settle_lines(&mut self, now: u64) {
+    fn settle_lines(&mut self) {
         if self.system.control.wants_reset {
             self.reset = Some(Cause::Software);
         }
@@ -323,15 +323,15 @@ impl Chip {
         ];
         let exceptions = &mut self.system.exceptions;
         for (interrupt, high) in lines {
-            exceptions.set_line(interrupt, high, now);
+            exceptions.set_line(interrupt, high);
         }
         for line in 0..5 {
-            exceptions.set_line(6 + line, self.exti.requests(1 << line), now);
+            exceptions.set_line(6 + line, self.exti.requests(1 << line));
         }
         for channel in 0..CHANNELS as u8 {
             // Channel 8 has an interrupt number of its own.
             let interrupt = if channel == 7 { 96 } else { 11 + channel };
-            exceptions.set_line(interrupt, self.dma.requests(channel.into()), now);
+            exceptions.set_line(interrupt, self.dma.requests(channel.into()));
         }
         let due = [
             self.system.deadline(),
@@ -348,7 +348,7 @@ impl Chip {
         ];
         self.deadline = due.into_iter().min().unwrap_or(u64::MAX);
         if self.reset.is_some() || self.next_move().is_some() {
-            self.deadline = now;
+            self.deadline = 0;
         }
     }
 }

@@ -34,10 +34,9 @@ pub enum Register {
 pub enum Stop {
     /// At this breakpoint instruction.
     Breakpoint(u32),
-    /// The cycles are used up, or the bus has a deadline.
+    /// The cycles are used up, the bus has a deadline, or an exception that no mask excludes is
+    /// pending.
     Spent(u32),
-    /// An exception that no mask excludes is pending.
-    Urgent(u32),
     /// After a supervisor call.
     Call(u32),
     /// An exception handler returned, with this value.
@@ -75,24 +74,12 @@ pub enum Fault {
 /// What can go wrong on the core.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum CoreError {
-    /// The engine refused a request.
-    #[error("the emulator failed to {what}: {why}")]
-    Engine {
-        /// The request.
-        what: &'static str,
-        /// Its answer.
-        why: String,
-    },
-    /// The program caused a fault.
-    #[error("the core stopped at {at:#010x} (called from {lr:#010x}): {why}")]
-    Fault {
-        /// Program counter.
-        at: u32,
-        /// Link register.
-        lr: u32,
-        /// Kind of the fault.
-        why: String,
-    },
+    /// The engine refused a request, with this answer.
+    #[error("the emulator failed: {0}")]
+    Engine(String),
+    /// There is no loop in which the program could hang.
+    #[error("the image has no loop")]
+    NoLoop,
 }
 
 /// Cycles and instructions since the start.
@@ -181,20 +168,3 @@ pub trait Bus {
 pub struct NoBus;
 
 impl Bus for NoBus {}
-
-/// Whether the masks let an exception of this priority through.
-///
-/// Source: ARMv7-M Architecture Reference Manual, B1.5.4 (`ExecutionPriority`).
-pub fn passes(priority: i16, primask: u32, basepri: u32, faultmask: u32) -> bool {
-    let mut level = i16::MAX;
-    if basepri & 0xFF != 0 {
-        level = (basepri & 0xFF) as i16;
-    }
-    if primask & 1 != 0 {
-        level = 0;
-    }
-    if faultmask & 1 != 0 {
-        level = -1;
-    }
-    priority < level
-}

@@ -83,11 +83,15 @@ impl Loaded {
     }
 }
 
-/// Name of the function at an address, of functions in the order of their addresses.
-pub fn named(functions: &[Function], address: u32) -> &str {
+/// Index of the function at an address, of functions in the order of their addresses.
+pub fn function_at(functions: &[Function], address: u32) -> Option<usize> {
     let after = functions.partition_point(|f| f.range.start <= address);
-    let found = functions[..after].last().filter(|f| f.range.contains(&address));
-    found.map_or("nowhere", |f| &f.name)
+    after.checked_sub(1).filter(|found| functions[*found].range.contains(&address))
+}
+
+/// Its name.
+pub fn named(functions: &[Function], address: u32) -> &str {
+    function_at(functions, address).map_or("nowhere", |found| &functions[found].name)
 }
 
 fn function<'a>(symbol: &impl ObjectSymbol<'a>) -> Option<Function> {

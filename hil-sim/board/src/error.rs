@@ -23,7 +23,7 @@ pub enum ImageError {
     #[error("{function} ended in {at}")]
     Lost {
         function: String,
-        /// The function in which it ended.
+        /// The function in which it ended, and how.
         at: String,
     },
 }

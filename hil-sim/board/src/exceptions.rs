@@ -40,8 +40,6 @@ pub struct Exceptions {
     priorities: [u8; COUNT],
     /// `PRIGROUP`: bits of a priority, from 0 to this, that do not preempt.
     group: u8,
-    /// When each became pending, cycles.
-    since: [u64; COUNT],
     urgent: Option<(u8, i16)>,
     /// The event register.
     pub event: bool,
@@ -58,7 +56,6 @@ impl Default for Exceptions {
             active: Vec::new(),
             priorities: [0; COUNT],
             group: 0,
-            since: [0; COUNT],
             urgent: None,
             event: false,
         }
@@ -81,10 +78,9 @@ const fn interrupts(set: u128, word: u32) -> u32 {
 
 impl Exceptions {
     /// Makes an exception pending.
-    pub fn pend(&mut self, number: u8, now: u64) {
-        if usize::from(number) < COUNT && self.pending >> number & 1 == 0 {
+    pub fn pend(&mut self, number: u8) {
+        if usize::from(number) < COUNT {
             self.pending |= 1 << number;
-            self.since[usize::from(number)] = now;
             self.refresh();
         }
     }
@@ -96,14 +92,14 @@ impl Exceptions {
 
     /// Sets the level of an interrupt line. While it is high the interrupt becomes
     /// pending again as soon as it is not active.
-    pub fn set_line(&mut self, interrupt: u8, high: bool, now: u64) {
+    pub fn set_line(&mut self, interrupt: u8, high: bool) {
         let number = number::INTERRUPT + interrupt;
         if !high {
             self.lines &= !(1 << number);
         } else if self.lines >> number & 1 == 0 {
             self.lines |= 1 << number;
             if !self.active.contains(&number) {
-                self.pend(number, now);
+                self.pend(number);
             }
         }
     }
@@ -205,21 +201,20 @@ impl Exceptions {
         self.urgent
     }
 
-    /// Takes an exception: it runs from now on. Returns since when it had been pending.
-    pub fn enter(&mut self, number: u8) -> u64 {
+    /// Takes an exception: it runs from now on.
+    pub fn enter(&mut self, number: u8) {
         self.pending &= !(1 << number);
         self.active.push(number);
         self.event = true;
         self.refresh();
-        self.since[usize::from(number)]
     }
 
     /// The exception that runs has returned.
-    pub fn leave(&mut self, now: u64) -> u8 {
+    pub fn leave(&mut self) -> u8 {
         let left = self.active.pop().unwrap_or(0);
         self.event = true;
         if self.lines >> left & 1 != 0 {
-            self.pend(left, now);
+            self.pend(left);
         }
         self.refresh();
         left
@@ -248,37 +243,24 @@ mod tests {
     fn the_most_urgent_goes_first_and_among_equals_the_lowest_number() {
         let mut e = with(&[(3, 0x40), (5, 0x20), (7, 0x20)]);
         for interrupt in [7, 3, 5] {
-            e.pend(INTERRUPT + interrupt, 0);
+            e.pend(INTERRUPT + interrupt);
         }
         for wanted in [5, 7, 3] {
             assert_eq!(next(&e), Some(wanted));
             e.enter(INTERRUPT + wanted);
             assert_eq!(next(&e), None, "none preempts its equal");
-            e.leave(0);
+            e.leave();
         }
         assert_eq!(next(&e), None);
-    }
-
-    #[test]
-    fn a_more_urgent_one_preempts() {
-        let mut e = with(&[(3, 0x40), (5, 0x20)]);
-        e.pend(INTERRUPT + 3, 0);
-        e.enter(INTERRUPT + 3);
-        e.pend(INTERRUPT + 5, 9);
-        assert_eq!(next(&e), Some(5));
-        assert_eq!(e.enter(INTERRUPT + 5), 9);
-        assert_eq!((e.depth(), e.running()), (2, INTERRUPT + 5));
-        assert_eq!(e.leave(0), INTERRUPT + 5);
-        assert_eq!(e.running(), INTERRUPT + 3);
     }
 
     #[test]
     fn only_the_upper_four_bits_count_and_the_group_decides_about_preemption() {
         let mut e = with(&[(3, 0x5F), (5, 0x4F)]);
         assert_eq!(e.priority_set(INTERRUPT + 3), 0x50);
-        e.pend(INTERRUPT + 3, 0);
+        e.pend(INTERRUPT + 3);
         e.enter(INTERRUPT + 3);
-        e.pend(INTERRUPT + 5, 0);
+        e.pend(INTERRUPT + 5);
         assert_eq!(next(&e), Some(5));
         // With bits 4 to 0 as subpriority, 0x40 and 0x50 are one group.
         e.set_group(4);
@@ -288,21 +270,21 @@ mod tests {
     #[test]
     fn a_line_that_stays_high_brings_its_interrupt_back() {
         let mut e = with(&[(3, 0x40)]);
-        e.set_line(3, true, 1);
+        e.set_line(3, true);
         e.enter(INTERRUPT + 3);
         assert_eq!(next(&e), None);
-        e.leave(2);
+        e.leave();
         assert_eq!(next(&e), Some(3), "its cause was not cleared");
         e.enter(INTERRUPT + 3);
-        e.set_line(3, false, 3);
-        e.leave(4);
+        e.set_line(3, false);
+        e.leave();
         assert_eq!(next(&e), None);
     }
 
     #[test]
     fn what_is_disabled_waits() {
         let mut e = with(&[]);
-        e.pend(INTERRUPT + 40, 0);
+        e.pend(INTERRUPT + 40);
         assert_eq!(next(&e), None);
         assert_eq!(e.pending(1), 1 << 8);
         e.enable(1, 1 << 8, true);

@@ -1,7 +1,7 @@
 //! A measurement image on the core: the host calls its functions and counts their cycles.
 
 use super::core::unicorn::{Access, Counted, Memory, UnicornCore};
-use super::core::{CoreError, Meter, NoBus, Register, Stop};
+use super::core::{Meter, NoBus, Register, Stop};
 use super::elf::{FLASH, Loaded, RAM, named};
 use super::error::ImageError;
 use super::spread::Spread;
@@ -69,10 +69,7 @@ impl Image {
 
     /// Address of a function, for [`Image::call`].
     pub fn function(&self, name: &str) -> Result<u32, ImageError> {
-        let found = self.loaded.functions.iter().find(|function| function.name == name);
-        found
-            .map(|function| function.range.start)
-            .ok_or_else(|| ImageError::Missing(name.to_owned()))
+        self.loaded.symbol(name)
     }
 
     /// Calls a function with at most four arguments.
@@ -95,34 +92,30 @@ impl Image {
     /// The error of a call that stopped elsewhere than at its end.
     fn lost(&self, function: &str, stop: Stop) -> ImageError {
         let at = match stop {
-            Stop::Fault { at, fault } => {
-                let lr = self.core.register(Register::Lr).unwrap_or_default();
-                let why = format!("{fault:?}");
-                return CoreError::Fault { at, lr, why }.into();
-            }
-            Stop::Breakpoint(at)
+            Stop::Fault { at, .. }
+            | Stop::Breakpoint(at)
             | Stop::Spent(at)
-            | Stop::Urgent(at)
             | Stop::Call(at)
             | Stop::Return(at)
             | Stop::Event(at)
             | Stop::Wait(at) => at,
         };
-        ImageError::Lost { function: function.to_owned(), at: self.name(at).to_owned() }
+        let (function, at) = (function.to_owned(), format!("{}: {stop:x?}", self.name(at)));
+        ImageError::Lost { function, at }
     }
 
     /// Calls a function once for each input, whose words are passed by reference. Returns the
     /// values and the cost of the calls; `worst_input` is the index of an input.
-    pub fn measure<I: AsRef<[u32]>>(
+    pub fn measure(
         &mut self,
         function: &str,
-        inputs: &[I],
+        inputs: &[Vec<u32>],
     ) -> Result<(Vec<u32>, Spread), ImageError> {
         let function = self.function(function)?;
         let mut values = Vec::with_capacity(inputs.len());
         let mut spread = Spread::default();
         for (index, words) in inputs.iter().enumerate() {
-            self.put(ARGUMENTS, words.as_ref())?;
+            self.put(ARGUMENTS, words)?;
             let call = self.call(function, &[ARGUMENTS])?;
             values.push(call.value);
             spread.note(call.meter, index);

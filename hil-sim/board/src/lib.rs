@@ -12,7 +12,7 @@ pub mod cycles;
 pub mod elf;
 pub mod error;
 pub mod exceptions;
-mod fault_injector;
+pub mod fault_injector;
 pub mod faults;
 pub mod image;
 pub mod load;

@@ -10,16 +10,9 @@ pub struct Line {
     pub level: String,
     /// The message.
     pub text: String,
-    /// The message in parts: text and values in turn.
-    parts: Vec<String>,
 }
 
 impl Line {
-    /// Numbers among the values, in their order.
-    pub fn numbers(&self) -> Vec<f64> {
-        self.parts.iter().filter_map(|part| part.trim().parse().ok()).collect()
-    }
-
     /// The message after `mark`.
     pub fn after(&self, mark: &str) -> Option<&str> {
         self.text.split_once(mark).map(|(_, rest)| rest)
@@ -59,7 +52,6 @@ impl Reader<'_> {
                 Ok(frame) => lines.push(Line {
                     level: frame.level().map_or("", |level| level.as_str()).to_owned(),
                     text: frame.display_message().to_string(),
-                    parts: frame.display_fragments().collect(),
                 }),
                 Err(DecodeError::UnexpectedEof) => return lines,
                 // A reset truncates the last frame.

@@ -132,11 +132,7 @@ impl Machine {
                 flash.get(at..at + 2) == Some(&TO_ITSELF)
             })
         });
-        let place = place.ok_or_else(|| CoreError::Engine {
-            what: "make the program hang",
-            why: "the image has no loop".to_owned(),
-        })?;
-        self.set_register(Register::Pc, place)
+        self.set_register(Register::Pc, place.ok_or(CoreError::NoLoop)?)
     }
 
     /// Resets the board; [`Restart::Power`] also clears RAM.
@@ -184,7 +180,7 @@ impl Machine {
             self.sleep(cycle);
             return Ok(false);
         }
-        if let Some(number) = self.takeable()? {
+        if let Some(number) = self.takeable() {
             self.enter(number, self.pc, false)?;
             return Ok(false);
         }
@@ -210,16 +206,15 @@ impl Machine {
     fn follow(&mut self, stop: Stop) -> Result<Option<u32>, CoreError> {
         self.note_tasks();
         match stop {
-            Stop::Spent(at) | Stop::Urgent(at) => self.pc = at,
+            Stop::Spent(at) => self.pc = at,
             Stop::Breakpoint(at) => {
                 self.pc = at;
                 return Ok(Some(at));
             }
             Stop::Call(at) => {
                 self.pc = at;
-                let now = self.now();
-                self.chip_mut().system.exceptions.pend(SV_CALL, now);
-                if self.takeable()? != Some(SV_CALL) {
+                self.chip_mut().system.exceptions.pend(SV_CALL);
+                if self.takeable() != Some(SV_CALL) {
                     // Masked, or no more urgent than the running exception: a fault.
                     self.chip_mut().system.exceptions.clear(SV_CALL);
                     self.fault(Cause::Program(super::core::Fault::Undefined), at)?;
@@ -320,7 +315,7 @@ impl Machine {
         self.chip_mut().advance(now);
         while let Some(due) = self.chip().next_move() {
             let found = self.carry(due)?;
-            self.chip_mut().moved(due.channel, found, now);
+            self.chip_mut().moved(due.channel, found);
         }
         if let Some(place) = self.chip().flash.needs() {
             let mut before = [0; 8];

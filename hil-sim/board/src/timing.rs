@@ -59,30 +59,3 @@ pub const fn division(signed: bool, n: u32, m: u32) -> u64 {
     let bits = m.leading_zeros() - n.leading_zeros() + 1;
     2 + (bits as u64 * 10).div_ceil(32)
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn divisions_take_from_2_to_12_cycles() {
-        assert_eq!(division(false, 5, 7), 2);
-        assert_eq!(division(false, 5, 0), 2);
-        assert_eq!(division(false, u32::MAX, 1), 12);
-        assert_eq!(division(true, -1_i32 as u32, 1), 3);
-        assert_eq!(division(true, i32::MIN as u32, 1), 12);
-        // Longer quotients never take less.
-        for shift in 1..32 {
-            assert!(division(false, 1 << shift, 1) >= division(false, 1 << (shift - 1), 1));
-        }
-    }
-
-    #[test]
-    fn only_what_may_be_skipped_or_depends_on_operands_is_deferred() {
-        let load = Instruction { size: 2, kind: Kind::Access(1) };
-        let sum = Instruction { size: 2, kind: Kind::Plain };
-        let quotient = Instruction { size: 4, kind: Kind::Divide { signed: true, n: 0, m: 1 } };
-        assert!(is_deferred(&load, true) && !is_deferred(&load, false));
-        assert!(!is_deferred(&sum, true) && is_deferred(&quotient, false));
-    }
-}

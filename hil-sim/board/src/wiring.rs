@@ -234,18 +234,3 @@ impl Wiring {
         bits | ((bits.count_ones() & 1) as u16) << 15
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_magnet_that_is_turned_over_reads_right_at_the_stow_end_of_any_rig() {
-        let mut rig = Rig::prototype();
-        rig.sense.angle_zero_code += 1000.0;
-        let mut wiring = Wiring::with(&[Mistake::ArmInwards]);
-        wiring.build(&rig, &mut hil_sim::scenario::Scenario::default().plant());
-        let code = stowed(&rig).round() as u16;
-        assert_eq!(wiring.arm(code) & 0x3FFF, code);
-    }
-}

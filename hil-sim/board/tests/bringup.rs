@@ -1,17 +1,17 @@
 //! The first power-up on the emulated board: a sound one, and each mistake in the wiring.
 
 use std::path::Path;
-use std::process::{Command, Stdio};
 
 use clap::ValueEnum;
 use hil_sim::bringup::{self, Line, Progress, Stdin};
+use hil_sim::params::{Client, StoreError};
 use hil_sim::probe::Port;
 use hil_sim::record::Run;
 use hil_sim::replay::replay;
 use hil_sim::scenario::Scenario;
 use interstage::params::Refusal;
-use interstage::params::link::{FrameReader, ToBoard, ToHost, frame};
-use interstage::params::service::{Request, Response};
+use interstage::params::link::{ToBoard, frame};
+use interstage::params::service::Request;
 use interstage::supervise::ServiceDuties;
 use interstage::units::Duty;
 use rig_board::bench::Bench;
@@ -19,6 +19,7 @@ use rig_board::bringup::Attended;
 use rig_board::wiring::Mistake;
 use serde_json::Value;
 
+use crate::common::cli::{Said, good, rig};
 use crate::common::{Board, OnUsb, elf, strings};
 
 /// The power-up of a board with these mistakes, every motion allowed.
@@ -130,18 +131,6 @@ fn send(board: &mut Board, request: Request) {
     assert_eq!(board.bench.line_send(&bytes).expect("runs"), bytes.len());
 }
 
-/// The board's answer within some milliseconds.
-fn answer(board: &mut Board) -> Response {
-    board.run(20);
-    let mut reader = FrameReader::new();
-    let bytes = board.bench.line_take().expect("runs");
-    let answers = bytes.into_iter().filter_map(|byte| reader.take(byte));
-    let ToHost::Parameters(1, response) = answers.last().expect("an answer") else {
-        panic!("another number");
-    };
-    response
-}
-
 const PRESS: ServiceDuties =
     ServiceDuties { drive: Duty::ZERO, pretightener: Duty::from_bits(6000) };
 const DRIVE: ServiceDuties =
@@ -178,8 +167,10 @@ fn a_host_that_falls_silent_loses_the_motor_within_a_fifth_of_a_second() {
 fn the_service_mode_is_refused_in_motion_and_ends_with_the_emergency_stop() {
     let mut board = Board::moving();
     for duties in [ServiceDuties::REST, DRIVE] {
-        send(&mut board, Request::Service(duties));
-        assert_eq!(answer(&mut board), Response::Refused(Refusal::NotService));
+        let refused = Client::new(&mut board).ask(Request::Service(duties)).expect_err("in motion");
+        assert!(
+            matches!(refused, StoreError::Refused(why) if why == Refusal::NotService.sentence())
+        );
     }
     assert!(!board.said("mode: service"));
     board.until("mode: deployed", 20_000);
@@ -197,17 +188,11 @@ fn the_service_mode_is_refused_in_motion_and_ends_with_the_emergency_stop() {
     board.assert_off(200);
 }
 
-/// `rig bringup` on the emulated board, as a user has it, with this standard input closed.
+/// `rig bringup` on the emulated board, as a user has it.
 fn verb(place: &Path, arguments: &[&str]) -> (Option<i32>, Value, String) {
-    let output = Command::new(env!("CARGO_BIN_EXE_rig-board"))
-        .current_dir(place)
-        .args(["bringup", "--target", "board", "--out", "up", "--json"])
-        .args(arguments)
-        .stdin(Stdio::null())
-        .output()
-        .expect("starts");
-    let printed = serde_json::from_slice(&output.stdout).unwrap_or(Value::Null);
-    (output.status.code(), printed, String::from_utf8_lossy(&output.stderr).into_owned())
+    let verb = ["bringup", "--target", "board", "--out", "up", "--json"];
+    let Said { code, printed, text } = rig(place, &[&verb, arguments].concat());
+    (code, printed, text)
 }
 
 #[test]
@@ -231,12 +216,8 @@ fn the_verb_moves_nothing_unconfirmed_and_goes_on_where_it_was_broken_off() {
     let page = std::fs::read_to_string(place.join("up/report.html")).expect("a page");
     assert!(page.contains("wired as it should be"));
     // What it proposes is on the page, and what `params` takes.
-    let restored = Command::new(env!("CARGO_BIN_EXE_rig-board"))
-        .current_dir(place)
-        .args(["params", "restore", "up/proposed.toml", "--target", "board", "--json"])
-        .output()
-        .expect("starts");
-    let restored: Value = serde_json::from_slice(&restored.stdout).expect("one object");
+    let restore = ["params", "restore", "up/proposed.toml", "--target", "board", "--json"];
+    let restored = good(place, &restore);
     for key in printed["proposed"].as_object().expect("keys").keys() {
         assert_eq!(restored["parameters"][key].to_string(), printed["proposed"][key], "{key}");
         assert!(page.contains(key.as_str()), "{key}");

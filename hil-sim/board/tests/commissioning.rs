@@ -4,7 +4,6 @@
 
 use std::fs::File;
 use std::path::Path;
-use std::time::Duration;
 
 use hil_sim::bringup::{self, Line, Progress, Stdin};
 use hil_sim::identify::accept::accept;
@@ -12,7 +11,7 @@ use hil_sim::identify::record::Record;
 use hil_sim::identify::result::identify;
 use hil_sim::params::{Client, Store, set_of};
 use hil_sim::plant::draw::PlantParameters;
-use hil_sim::probe::{Port, PortError};
+use hil_sim::probe::Port;
 use hil_sim::record::{Summary, Writer, recordings};
 use hil_sim::scenario::Scenario;
 use hil_sim::testing::long;
@@ -38,40 +37,10 @@ fn board(hidden: &Scenario, plant: Option<PlantParameters>) -> Board {
     board
 }
 
-/// The probe at a board whose log is kept.
-struct Probe<'a>(&'a mut Board);
-
-impl Port for Probe<'_> {
-    fn up(&mut self, channel: u32) -> Result<Vec<u8>, PortError> {
-        if channel == 1 { Ok(Vec::new()) } else { self.0.bench.up(channel) }
-    }
-
-    fn down(&mut self, channel: u32, bytes: &[u8]) -> Result<usize, PortError> {
-        self.0.bench.down(channel, bytes)
-    }
-
-    fn reset(&mut self) -> Result<(), PortError> {
-        self.0.bench.reset()
-    }
-
-    fn memory(&mut self, address: u32, into: &mut [u8]) -> Result<(), PortError> {
-        self.0.bench.memory(address, into)
-    }
-
-    fn pass(&mut self) -> Result<(), PortError> {
-        self.0.step();
-        Ok(())
-    }
-
-    fn now(&self) -> Duration {
-        self.0.bench.now()
-    }
-}
-
 /// Gives the board these parameters, and resets it.
 fn give(board: &mut Board, scenario: &Scenario) {
     let set = set_of("prototype", &scenario.rig).expect("a set");
-    Client::new(Probe(board)).put(&set).expect("the board takes it");
+    Client::new(&mut *board).put(&set).expect("the board takes it");
     board.bench.reset().expect("resets");
     board.frames.clear();
     board.until("mode: idle", 3000);

@@ -1,7 +1,7 @@
 //! The campaign of faults on the emulated board, a few of them at one instant each, and a
 //! scenario's faults in a run on the board. `cargo rig faults --target board` runs all.
 
-use hil_sim::faults::campaign::{Case, Outcome};
+use hil_sim::faults::campaign::{Case, MatrixRow};
 use hil_sim::faults::sets;
 use hil_sim::scenario::Scenario;
 use hil_sim::scenario::injection::{Entry, HARDWARE, Injection, Kind, Target};
@@ -10,11 +10,14 @@ use rig_board::chip::map::PARAMETER_SETS;
 
 use crate::common::{Board, elf, ran, strings, tried};
 
-fn matrix(wanted: &[&str]) -> Outcome {
+/// The rows of these faults, in their order, at an instant each.
+fn matrix(wanted: &[&str]) -> Vec<MatrixRow> {
     let named = |case: &Case| wanted.contains(&case.name().as_str());
     let cases: Vec<Case> = Case::all_on_board().into_iter().filter(named).collect();
     assert_eq!(cases.len(), wanted.len());
-    tried(cases, 1)
+    let mut lines = tried(cases, 1).matrix;
+    lines.sort_by_key(|line| wanted.iter().position(|name| line.fault == *name));
+    lines
 }
 
 #[test]
@@ -41,9 +44,7 @@ fn faults_on_the_board_are_detected_or_tolerated_and_every_bound_is_kept() {
         ("debugger halted", Some(123)),
         ("image one-wrong-bit", None),
     ];
-    let outcome = matrix(&faults.map(|(name, _)| name));
-    for (name, code) in faults {
-        let line = outcome.matrix.iter().find(|line| line.fault == name).expect(name);
+    for (line, (name, code)) in matrix(&faults.map(|(name, _)| name)).iter().zip(faults) {
         // A sensor that reads the low end is out of its range before it is missed, and of the two
         // that one stream delivers either may be missed first.
         let alike =
@@ -85,9 +86,7 @@ fn parameters_in_flash_are_the_old_ones_the_new_ones_or_named_as_damaged() {
         ("parameter-save torn", Some("reset by supply")),
         ("parameter-save reset", Some("reset by pin")),
     ];
-    let outcome = matrix(&faults.map(|(name, _)| name));
-    for (name, restart) in faults {
-        let line = outcome.matrix.iter().find(|line| line.fault == name).expect(name);
+    for (line, (_, restart)) in matrix(&faults.map(|(name, _)| name)).iter().zip(faults) {
         // A limit that comes now and then without a fault too, as 209, is none of it.
         let no_fault = line.codes.keys().all(|code| *code >= 200);
         assert!(line.restarted() == restart && no_fault, "{line:?}");

@@ -3,11 +3,10 @@
 
 use std::fs;
 use std::path::Path;
-use std::process::Command;
 
 use hil_sim::testing::long;
 
-use crate::verbs::program;
+use crate::common::cli::rig;
 
 /// Commands before this heading are run always, the others with the long samples.
 const LONG_FROM: &str = "## 7.";
@@ -35,22 +34,6 @@ fn blocks(page: &str) -> Vec<Block<'_>> {
     blocks
 }
 
-/// Runs a command, which must end with this code.
-#[cfg(unix)]
-fn run(place: &Path, arguments: &[&str], code: i32) {
-    let probe_rs = place.join("probe-rs");
-    let output = Command::new(program(arguments))
-        .current_dir(place)
-        .env("PROBE_RS", probe_rs)
-        .args(arguments)
-        .output()
-        .expect("starts");
-    let said = String::from_utf8_lossy(&output.stderr);
-    let printed = String::from_utf8_lossy(&output.stdout);
-    let shown = format!("cargo rig {}: {said}{printed}", arguments.join(" "));
-    assert_eq!(output.status.code(), Some(code), "{shown}");
-}
-
 /// As the page says it, with the emulated board for the probe's, a view without a terminal and a
 /// bring-up without a hand. One with a mistake in the wiring has to find it.
 #[cfg(unix)]
@@ -64,7 +47,9 @@ fn follow(place: &Path, command: &str) {
         let more = [&["--target", "board"][..], &["--yes"]];
         arguments.extend(more.into_iter().filter(|more| !on_board.contains(more[0])).flatten());
     }
-    run(place, &arguments, i32::from(arguments.contains(&"--mistake")));
+    let said = rig(place, &arguments);
+    let expected = i32::from(arguments.contains(&"--mistake"));
+    assert_eq!(said.code, Some(expected), "{arguments:?}: {}{}", said.text, said.printed);
 }
 
 #[cfg(unix)]

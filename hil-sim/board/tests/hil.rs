@@ -76,27 +76,22 @@ fn bridges_have_no_power(port: &mut EmulatedPort) {
 
 #[test]
 fn a_slow_port_stretches_time_and_changes_nothing() {
-    let (mut slow, mut fast) = (OnUsb::new(board()), board());
-    let (mut slow_rig, mut fast_rig) = (Rigged::new(5), Rigged::new(5));
-    let (mut slow_line, mut fast_line) =
-        (HostLine::begin(&mut slow).expect("ready"), HostLine::begin(&mut fast).expect("ready"));
-    let (mut slow_log, mut fast_log) = (Vec::new(), Vec::new());
-    for tick in FIRST..FIRST + 800 {
-        let command = (tick == FIRST + 400).then_some(Command::Start);
-        let slow = slow_rig.tick(&mut slow_line, tick, command);
-        let fast = fast_rig.tick(&mut fast_line, tick, command);
-        assert_eq!(slow, fast, "tick {tick}");
-        slow_log.extend(slow_line.port().up(1).expect("reads"));
-        fast_log.extend(fast_line.port().up(1).expect("reads"));
-    }
-    assert!(fast_log.len() > 10_000 && slow_log == fast_log, "{} bytes", fast_log.len());
+    let moves = |tick: u32, mode| tick >= FIRST + 800 && matches!(mode, Mode::Run(..));
+    let slow = deployed(&mut OnUsb::new(board()), |_| true, moves);
+    let fast = deployed(&mut board(), |_| true, moves);
+    assert!(fast.1.len() > 10_000 && slow.1 == fast.1, "{} bytes", fast.1.len());
+    assert!(slow.0 == fast.0, "other commands");
 }
 
-/// Commands of the bridges in every tick of a deployment, with the log's channel read
-/// in the ticks that `reads` names, and what was read.
-fn commands(reads: impl Fn(u32) -> bool) -> (Vec<Taken>, Vec<u8>) {
-    let (mut port, mut rig) = (board(), Rigged::new(3));
-    let mut line = HostLine::begin(&mut port).expect("ready");
+/// A deployment over this port up to the tick in which `ends` says so, with the log's channel read
+/// in the ticks that `reads` names: the commands of the bridges in every tick, what was read, and
+/// the last codes.
+fn deployed(
+    port: &mut dyn Port,
+    reads: impl Fn(u32) -> bool,
+    ends: impl Fn(u32, Mode) -> bool,
+) -> (Vec<Taken>, Vec<u8>, Given) {
+    let (mut rig, mut line) = (Rigged::new(3), HostLine::begin(port).expect("ready"));
     let (mut start, mut mode) = (Some(Command::Start), Mode::Boot);
     let (mut all, mut log) = (Vec::new(), Vec::new());
     for tick in FIRST..FIRST + 12_000 {
@@ -107,11 +102,27 @@ fn commands(reads: impl Fn(u32) -> bool) -> (Vec<Taken>, Vec<u8>) {
         if reads(tick) {
             log.extend(line.port().up(1).expect("reads"));
         }
-        if matches!(mode, Mode::Complete(_)) {
-            return (all, log);
+        if ends(tick, mode) {
+            return (all, log, rig.given);
         }
     }
     panic!("it does not arrive: {mode:?}");
+}
+
+/// Commands of the bridges in every tick of a deployment, and what was read of its log.
+fn commands(reads: impl Fn(u32) -> bool) -> (Vec<Taken>, Vec<u8>) {
+    let arrives = |_, mode| matches!(mode, Mode::Complete(_));
+    let (all, log, _) = deployed(&mut board(), reads, arrives);
+    (all, log)
+}
+
+/// Runs a deployment for so many ticks, and gives the board's codes there.
+fn under_way(port: &mut EmulatedPort, ticks: u32) -> Given {
+    let reads = |tick: u32| tick.is_multiple_of(32);
+    let (all, _, given) = deployed(port, reads, |tick, _| tick == FIRST + ticks - 1);
+    let mode = all.last().and_then(Taken::mode);
+    assert!(matches!(mode, Some(Mode::Run(..))), "{mode:?}");
+    given
 }
 
 #[test]
@@ -155,22 +166,6 @@ impl Rigged {
         self.plant.step(&session::drives(drive, preload), 1e-3).expect("moves");
         taken
     }
-}
-
-/// Runs a deployment up to this tick, and gives the board and its codes there.
-fn under_way(port: &mut EmulatedPort, ticks: u32) -> Given {
-    let mut rig = Rigged::new(3);
-    let mut line = HostLine::begin(port).expect("ready");
-    let (mut start, mut mode) = (Some(Command::Start), Mode::Boot);
-    for tick in FIRST..FIRST + ticks {
-        let command = if mode == Mode::Idle { start.take() } else { None };
-        mode = rig.tick(&mut line, tick, command).mode().expect("a mode");
-        if tick.is_multiple_of(32) {
-            line.port().up(1).expect("reads");
-        }
-    }
-    assert!(matches!(mode, Mode::Run(..)), "{mode:?}");
-    rig.given
 }
 
 #[test]

@@ -52,10 +52,7 @@ fn assert_unconfirmed(restart: &Restart, at: f64) {
 /// Lets the supply fall during a run; the snapshot in the report of the next start.
 fn falls(board: &mut Board) -> Option<DriveSnapshot> {
     board.strike(fault(Target::Supply, Kind::Off));
-    let (cause, after, driven) = board.reset(5);
-    assert_eq!(cause, Cause::Power);
-    assert!(after <= 1, "{after} ms");
-    assert!(!driven[1..].contains(&true), "{driven:?}");
+    board.ends(Cause::Power, 2, 1);
     let restart = board.report();
     assert_eq!(restart.reset, Reset::Power);
     assert_eq!(restart.snapshot.is_some(), restart.crash.is_some());
@@ -157,10 +154,7 @@ fn a_dip_of_the_supply_cuts_the_bridges_and_restarts() {
     let mut board = Board::moving();
     let at = board.position_mm();
     board.strike(fault(Target::Supply, Kind::Weak));
-    let (cause, after, driven) = board.reset(60);
-    assert_eq!(cause, Cause::Software);
-    assert!(after < 40, "{after} ms");
-    assert!(!driven[1..].contains(&true), "{driven:?}");
+    board.ends(Cause::Software, 40, 1);
     let restart = board.report();
     assert_eq!(restart.crash.expect("a crash").stopped, Stopped::Supply);
     assert_unconfirmed(&restart, at);
@@ -183,10 +177,7 @@ fn a_low_supply_until_the_watchdog_resets_is_no_hang() {
             board.machine().poke(RECORDS, &[0; PAGE_BYTES]).expect("flash");
         }
         sags(&mut board, 400);
-        let (cause, after, driven) = board.reset(150);
-        assert_eq!(cause, Cause::Watchdog);
-        assert!((80..130).contains(&after), "{after} ms");
-        assert!(!driven[1..].contains(&true), "{driven:?}");
+        assert!(board.ends(Cause::Watchdog, 130, 1) >= 80);
         let restart = board.report();
         assert_eq!(restart.crash.expect("a crash").stopped, Stopped::Supply);
         // Where the bridges went off; but the drive may have been moved since.
@@ -274,9 +265,7 @@ fn an_inverted_bit_of_the_image_is_reported_and_held() {
         let mut board = Board::moving();
         board.flip(place, 4);
         board.until(DAMAGED, CHECKED_MS);
-        let (cause, _, driven) = board.reset(20);
-        assert_eq!(cause, Cause::Software, "{place:#x}");
-        assert!(!driven[1..].contains(&true), "{driven:?}");
+        board.ends(Cause::Software, 20, 1);
         // It stays off and reports every second; it ignores commands.
         for _ in 0..2 {
             board.until(DAMAGED, 1100);

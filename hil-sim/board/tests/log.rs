@@ -1,9 +1,6 @@
 //! The binary log of the firmware itself, on the emulated board.
 
-use std::collections::VecDeque;
-use std::process::Command;
-
-use hil_sim::record::{Controller, Decoder, Item, Mark, Run};
+use hil_sim::record::{Controller, Mark, Run};
 use hil_sim::replay::replay;
 use interstage::rig::Rig;
 use interstage::supervise::Mode;
@@ -59,9 +56,6 @@ enum Reader {
     Mute,
 }
 
-/// Values of the text log's crossings, from the speed on.
-type Crossings = Vec<Vec<f64>>;
-
 /// What the control tick cost, tick by tick, and when it began.
 #[derive(Default)]
 struct Ticks {
@@ -106,57 +100,33 @@ impl Ticks {
 /// Has the image keep no tick for the log: the function that does returns at once.
 fn mute(board: &mut Board) {
     const BX_LR: [u8; 2] = [0x70, 0x47];
-    let machine = &mut board.bench.machine;
-    let keeps = |name: &str| name.ends_with("exchange::Exchange::record");
-    let found: Vec<u32> = machine
-        .image
-        .functions
-        .iter()
-        .filter(|function| keeps(&function.name))
-        .map(|function| function.range.start)
-        .collect();
-    assert_eq!(found.len(), 1, "the function that keeps a tick");
-    machine.poke(found[0], &BX_LR).expect("flash");
+    let keeps = board.function("exchange::Exchange::record");
+    board.machine().poke(keeps, &BX_LR).expect("flash");
 }
 
-/// A run until the drive has arrived: how long it took, ms, what the text log says of the
-/// crossings, and what the tick cost.
-fn deployment(reader: Reader) -> (u32, Crossings, Ticks) {
+/// A run until the drive has arrived: how long it took, ms, and what the tick cost. That the
+/// controller gives the same bits with any reader is seen in lockstep: `hil.rs`.
+fn deployment(reader: Reader) -> (u32, Ticks) {
     let mut board = Board::off(&["run.seed=1"]);
     board.bench.listen(reader == Reader::There);
     if reader == Reader::Mute {
         mute(&mut board);
     }
     board.until("mode: idle", 3000);
-    let (mut ticks, mut crossings) = (Ticks::default(), Vec::new());
+    let mut ticks = Ticks::default();
     board.bench.machine.profile.take_polls();
     board.send(b's');
     for millisecond in 0..8000 {
         if reader == Reader::Stalled {
             board.bench.listen(millisecond % 1000 < 300);
         }
-        let (_, lines) = board.bench.step().expect("runs");
-        board.bench.take_frames();
-        let closed = lines.iter().filter(|line| line.text.contains("] step "));
-        crossings.extend(closed.map(|line| line.numbers()[4..].to_vec()));
+        board.step();
         ticks.gather(&mut board);
-        if lines.iter().any(|line| line.text.contains("mode: deployed")) {
-            return (millisecond, crossings, ticks);
+        if board.said("mode: deployed") {
+            return (millisecond, ticks);
         }
     }
     panic!("it did not arrive");
-}
-
-/// Ledgers that differ by no more than noise: the journal's time differs, and with it the
-/// cycle in which an interrupt is taken, which the loop amplifies as it does any noise. That
-/// the controller itself gives the same bits is seen in lockstep, where there is no such
-/// thing: `hil.rs`.
-fn alike(name: &str, read: &(u32, Crossings, Ticks), other: &(u32, Crossings, Ticks)) {
-    assert!(read.0.abs_diff(other.0) <= 20, "{name}: {} ms, {} ms", read.0, other.0);
-    assert_eq!((read.1.len(), other.1.len()), (3, 3), "{name}");
-    for (read, other) in read.1.iter().flatten().zip(other.1.iter().flatten()) {
-        assert!((read - other).abs() <= 0.3 + 0.02 * other.abs(), "{name}: {read} {other}");
-    }
 }
 
 /// Telemetry at full rate changes nothing of the control tick's beginning, with or without a
@@ -168,22 +138,22 @@ fn neither_telemetry_nor_its_reader_changes_when_the_tick_begins_or_what_it_take
     /// And the extremes of their beginnings but for one tick in a thousand, cycles: 1 us, a
     /// thousandth of the period.
     const EXTREMES: f64 = 170.0;
-    let read = deployment(Reader::There);
+    let (arrived, read) = deployment(Reader::There);
     let off = |one: f64, other: f64| (one / other - 1.0).abs();
     for (name, reader) in
         [("absent", Reader::Absent), ("stalled", Reader::Stalled), ("mute", Reader::Mute)]
     {
-        let other = deployment(reader);
-        alike(name, &read, &other);
-        let (cost, jitter) = (other.2.cost(), other.2.jitter());
+        let (millisecond, ticks) = deployment(reader);
+        assert!(arrived.abs_diff(millisecond) <= 20, "{name}: {arrived} ms, {millisecond} ms");
+        let (cost, jitter) = (ticks.cost(), ticks.jitter());
         for (what, one, other) in [
-            ("deviation of its beginning", read.2.jitter()[0], jitter[0]),
-            ("mean cycles", read.2.cost()[0], cost[0]),
-            ("most cycles", read.2.cost()[1], cost[1]),
+            ("deviation of its beginning", read.jitter()[0], jitter[0]),
+            ("mean cycles", read.cost()[0], cost[0]),
+            ("most cycles", read.cost()[1], cost[1]),
         ] {
             assert!(off(one, other) <= SAME, "{name}: {what}: {one:.1}, {other:.1}");
         }
-        let (one, other) = (read.2.jitter()[1], jitter[1]);
+        let (one, other) = (read.jitter()[1], jitter[1]);
         println!("{name}: earliest to latest beginning: {one}, {other} cycles");
         assert!((one - other).abs() <= EXTREMES, "{name}: extremes: {one}, {other}");
     }
@@ -248,106 +218,51 @@ fn a_restart_in_the_middle_is_marked_and_both_parts_run_again() {
     assert!(result.ticks as usize > run.rows.len() / 2, "{result:?}");
 }
 
-/// Resident memory of this process, bytes; none if the system does not report it.
-fn resident() -> Option<u64> {
-    let text = std::fs::read_to_string("/proc/self/statm").ok()?;
-    text.split_whitespace().nth(1)?.parse::<u64>().ok().map(|pages| pages * 4096)
-}
-
-/// Set in the process that measures its memory.
-const ALONE: &str = "INTERSTAGE_ALONE";
-
-/// Two minutes on the board. What it logs stays as close to the truth as in the first
-/// round, and nothing on the board or about it grows.
+/// Two minutes on the board. What it logs stays as close to the truth as in the first round.
 #[test]
 fn minutes_of_deploying_and_retracting_are_logged_without_a_gap_or_drift() {
     const ROUNDS: usize = 36;
-    const NAME: &str = "log::minutes_of_deploying_and_retracting_are_logged_without_a_gap_or_drift";
     if !hil_sim::testing::long() {
         return;
     }
-    // In a process of its own: the memory of the other tests' boards is not this one's.
-    if std::env::var_os(ALONE).is_none() {
-        let mut alone = Command::new(std::env::current_exe().expect("this program"));
-        let ended = alone.args(["--exact", NAME]).env(ALONE, "1").output().expect("runs");
-        let said = String::from_utf8_lossy(&ended.stdout);
-        assert!(ended.status.success() && said.contains("1 passed"), "{said}");
-        return;
-    }
     let mut board = Board::off(&["run.seed=1"]);
-    board.until("mode: idle", 3000);
-    let (mut decoder, mut truths) = (Decoder::new(), VecDeque::new());
-    let mut due: Option<u32> = None;
-    let mut worst = [(0.0, 0.0); ROUNDS];
-    let (mut log, mut settled) = (std::mem::take(&mut board.frames), None);
-    decoder.read(&log, &mut |item| {
-        if let Item::Tick(record, _) = item {
-            due = Some(record.at() + 1);
+    // Position and preload of the plant by the millisecond, which is the tick's number.
+    let mut truths = vec![(0.0, 0.0)];
+    let mut step = |board: &mut Board| {
+        board.step();
+        let truth = board.bench.plant.truth();
+        truths.push((truth.position_mm, truth.preload_n));
+        // What the emulator books of the tasks is not the board's.
+        board.bench.machine.profile.take_polls();
+    };
+    for round in 0..=ROUNDS {
+        let (letter, arrived) = match round {
+            0 => (None, "mode: idle"),
+            _ if round % 2 == 1 => (Some(b's'), "mode: deployed"),
+            _ => (Some(b'r'), "mode: retracted"),
+        };
+        letter.into_iter().for_each(|letter| board.send(letter));
+        let (from, mut left) = (board.log.len(), 20_000);
+        while !board.log[from..].iter().any(|line| line.contains(arrived)) {
+            assert!(left > 0, "round {round} does not arrive");
+            left -= 1;
+            step(&mut board);
         }
-    });
-    for (round, worst) in worst.iter_mut().enumerate() {
-        let (letter, arrived) =
-            if round % 2 == 0 { (b's', "mode: deployed") } else { (b'r', "mode: retracted") };
-        board.send(letter);
-        let mut left = None;
-        for millisecond in 0.. {
-            assert!(millisecond < 20_000, "round {round} does not arrive");
-            let (_, lines) = board.bench.step().expect("runs");
-            // What the emulator books of the tasks is not the board's.
-            board.bench.machine.profile.take_polls();
-            let truth = board.bench.plant.truth();
-            let now = (board.bench.time_s() * 1e3).round() as u32;
-            truths.push_back((now, truth.position_mm, truth.preload_n));
-            let frames = board.bench.take_frames();
-            log.extend_from_slice(&frames);
-            decoder.read(&frames, &mut |item| match item {
-                Item::Tick(record, _) => {
-                    let at = record.at();
-                    assert!(due.is_none_or(|due| due == at), "{due:?} {at}");
-                    due = Some(at + 1);
-                    while truths.front().is_some_and(|(ms, ..)| *ms < at) {
-                        truths.pop_front();
-                    }
-                    if let Some((ms, position, preload)) = truths.front()
-                        && *ms == at
-                        && matches!(record.telemetry.mode, Mode::Run(..))
-                    {
-                        let off = |seen: Q16, truth: f64| (seen.to_num::<f64>() - truth).abs();
-                        worst.0 = off(record.telemetry.position, *position).max(worst.0);
-                        worst.1 = off(record.telemetry.preload, *preload).max(worst.1);
-                    }
-                }
-                Item::Mark(mark) => panic!("{mark}"),
-                _ => {}
-            });
-            if lines.iter().any(|line| line.text.contains(arrived)) {
-                left = Some(100);
-            }
-            left = left.map(|left: u32| left - 1);
-            if left == Some(0) {
-                break;
-            }
-        }
-        // What waits for the log is what the log has not brought yet: two frames.
-        assert!(truths.len() < 64, "{} ticks wait", truths.len());
-        if round == 7 {
-            settled = resident().map(|bytes| bytes - log.capacity() as u64);
+        (0..100).for_each(|_| step(&mut board));
+    }
+    let run = Run::of_stream(&board.frames);
+    assert!(run.is_complete() && run.rows.len() > 120_000, "{:?}", run.counts);
+    assert!(run.rows.windows(2).all(|pair| pair[1].tick == pair[0].tick + 1));
+    assert_eq!(run.counts.garbage_bytes, 0);
+    for row in &run.rows {
+        let seen = row.telemetry().expect("a row of a controller");
+        let (position_mm, preload_n) = truths[row.tick as usize];
+        let off = |seen: Q16, truth: f64| (seen.to_num::<f64>() - truth).abs();
+        if matches!(seen.mode, Mode::Run(..)) {
+            assert!(off(seen.position, position_mm) < POSITION_MM, "{row:?}: {position_mm} mm");
+            assert!(off(seen.preload, preload_n) < PRELOAD_N, "{row:?}: {preload_n} N");
         }
     }
-    let tally = *decoder.counts();
-    assert!(tally.ticks > 120_000, "{tally:?}");
-    assert_eq!((tally.lost_frames, tally.lost_ticks, tally.garbage_bytes), (0, 0, 0));
-    for (round, (position, preload)) in worst.iter().enumerate() {
-        assert!(*position < POSITION_MM, "round {round}: {position} mm");
-        assert!(*preload < PRELOAD_N, "round {round}: {preload} N");
-    }
-    // The engine's caches are full after eight rounds; the log in memory may grow. What the
-    // bench keeps of a round is less than 1 MiB.
-    if let (Some(before), Some(after)) = (settled, resident()) {
-        let grown = (after - log.capacity() as u64).saturating_sub(before);
-        assert!(grown < (ROUNDS as u64 - 8) << 20, "{grown} bytes");
-    }
-    let run = Run::of_stream(&log);
     assert_eq!(run.ledger.len(), 3 * ROUNDS);
     assert!(replay(&run, &Rig::prototype()).expect("a sound rig").is_equal());
 }

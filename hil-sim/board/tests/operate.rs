@@ -35,10 +35,6 @@ fn done(port: &mut dyn Port, what: Operation) -> Operated {
     ended.unwrap_or_else(|error| panic!("{what:?}: {error}"))
 }
 
-fn tread_mm(bench: &Bench<'_>) -> f64 {
-    bench.plant.truth().rotation_rad * bench.plant.parameters().ring.radius_mm
-}
-
 #[test]
 fn a_rig_goes_home_and_lets_go_and_is_not_zeroed_while_the_load_wedges_its_arm() {
     let mut bench = bench(Direction::Retract);
@@ -58,9 +54,9 @@ fn the_operators_stop_ends_what_moves_and_a_jog_goes_as_far_as_it_was_asked() {
     let home = stopped(&mut bench, Operation::Home, 100).expect("no failure");
     assert!(!home.done && home.mode == "idle" && home.travel_mm < -1.0, "{home:?}");
     let jogged = |bench: &mut Bench<'_>, wanted, looks| {
-        let before = tread_mm(bench);
+        let before = bench.tread_mm();
         let jog = stopped(bench, Operation::Jog(wanted), looks).expect("no failure");
-        let truly = tread_mm(bench) - before;
+        let truly = bench.tread_mm() - before;
         assert!((truly - jog.travel_mm).abs() < 0.05, "{truly} {jog:?}");
         (jog, truly)
     };

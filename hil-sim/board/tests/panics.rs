@@ -13,7 +13,7 @@ mod known;
 mod names;
 
 use graph::Graph;
-use known::{judge, judge_indirect};
+use known::judge;
 use names::{Frame, Names};
 
 use crate::common::elf;
@@ -64,8 +64,7 @@ struct Site {
 struct Found {
     /// Functions that can be reached from the roots, and all of them.
     reached: (usize, usize),
-    panics: Vec<Site>,
-    indirect: Vec<Site>,
+    sites: Vec<Site>,
 }
 
 fn walk(elf: &[u8]) -> Found {
@@ -86,23 +85,20 @@ fn walk(elf: &[u8]) -> Found {
         assert!(roots.len() > before, "no {root}");
     }
     let reached = graph.reach(&roots, &is_machinery);
-    let (mut panics, mut indirect) = (Vec::new(), Vec::new());
+    let mut sites = Vec::new();
     for (index, path) in &reached {
         for branch in &graph.branches[*index] {
             let called = branch.to.map(|to| graph.functions[to].name.clone());
-            let panicking = called.as_deref().is_some_and(is_machinery);
-            if called.is_some() && !panicking {
-                continue;
+            if called.as_deref().is_none_or(is_machinery) {
+                sites.push(Site {
+                    calls: called.unwrap_or_default(),
+                    frames: names.frames(branch.from),
+                    path: path.iter().map(|at| graph.functions[*at].name.clone()).collect(),
+                });
             }
-            let site = Site {
-                calls: called.unwrap_or_default(),
-                frames: names.frames(branch.from),
-                path: path.iter().map(|at| graph.functions[*at].name.clone()).collect(),
-            };
-            if panicking { panics.push(site) } else { indirect.push(site) }
         }
     }
-    Found { reached: (reached.len(), graph.functions.len()), panics, indirect }
+    Found { reached: (reached.len(), graph.functions.len()), sites }
 }
 
 #[test]
@@ -112,21 +108,18 @@ fn the_control_tick_reaches_no_panic_of_its_own() {
     let (reached, all) = found.reached;
     assert!(reached > 20 && reached < all, "{reached} of {all}");
     let reached = |name: &str| {
-        found.panics.iter().chain(&found.indirect).any(|site| {
+        found.sites.iter().any(|site| {
             let frames = site.frames.iter().map(|frame| &frame.function);
             site.path.iter().chain(frames).any(|function| function.contains(name))
         })
     };
     assert!(reached("tasks::motors::motors") && reached("tasks::sensors::arm_angle"));
-    let unexplained = found.panics.iter().filter(|site| judge(site).is_none());
-    let unexplained =
-        unexplained.chain(found.indirect.iter().filter(|s| judge_indirect(s).is_none()));
-    let unexplained: Vec<&Site> = unexplained.collect();
+    let unexplained: Vec<_> = found.sites.iter().filter(|site| judge(site).is_none()).collect();
     assert!(unexplained.is_empty(), "{unexplained:#?}");
     // In the controller itself there is not even one that is known to be harmless.
     let own =
         ["src/tick", "src/control/", "src/estimate/", "src/supervise/", "src/sense/", "src/model/"];
-    for site in &found.panics {
+    for site in found.sites.iter().filter(|site| !site.calls.is_empty()) {
         let within = site.frames.iter().find(|frame| own.iter().any(|o| frame.file.starts_with(o)));
         let made = site.frames.iter().find(|frame| !frame.function.starts_with("core::"));
         assert!(within.is_none() || within != made, "{site:#?}");

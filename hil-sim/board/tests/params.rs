@@ -1,15 +1,16 @@
 //! `rig params` on the emulated board, as a user has it.
 
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
 
 use hil_sim::params::set_of;
+use interstage::log::crc32;
 use interstage::params::{ParameterSet, SCHEMA, SetError, slots};
 use interstage::rig::Rig;
 use rig_board::chip::map::PARAMETER_SETS;
 use serde_json::Value;
 
 use crate::common::Board;
+use crate::common::cli::{Said, rig};
 
 /// A place for the board's flash, and for files.
 struct Place(tempfile::TempDir);
@@ -27,31 +28,23 @@ impl Place {
         std::fs::read(self.at("flash")).expect("kept")
     }
 
-    fn run(&self, arguments: &[&str]) -> Output {
-        Command::new(env!("CARGO_BIN_EXE_rig-board"))
-            .current_dir(self.0.path())
-            .arg("params")
-            .args(arguments)
-            .args(["--target", "board", "--flash", "flash", "--json"])
-            .output()
-            .expect("starts")
+    fn run(&self, arguments: &[&str]) -> Said {
+        let target = ["--target", "board", "--flash", "flash", "--json"];
+        rig(self.0.path(), &[&["params"], arguments, &target].concat())
     }
 
     /// What a command prints that must end well.
     fn good(&self, arguments: &[&str]) -> Value {
-        let output = self.run(arguments);
-        let said = String::from_utf8_lossy(&output.stderr);
-        assert_eq!(output.status.code(), Some(0), "{arguments:?}: {said}");
-        serde_json::from_slice(&output.stdout).expect("one object")
+        let said = self.run(arguments);
+        assert_eq!(said.code, Some(0), "{arguments:?}: {}", said.text);
+        said.printed
     }
 
     /// The last line that a command says which must be refused.
     fn refused(&self, arguments: &[&str]) -> String {
-        let output = self.run(arguments);
-        assert_eq!(output.status.code(), Some(2), "{arguments:?}");
-        assert!(output.stdout.is_empty());
-        let said = String::from_utf8_lossy(&output.stderr).into_owned();
-        said.lines().last().expect("it says why").to_owned()
+        let said = self.run(arguments);
+        assert_eq!((said.code, said.printed), (Some(2), Value::Null), "{arguments:?}");
+        said.text.lines().last().expect("it says why").to_owned()
     }
 }
 
@@ -119,17 +112,6 @@ fn powered(flash: &[u8], milliseconds: u32) -> (Vec<String>, bool) {
     (board.log, driven)
 }
 
-/// CRC-32, bit by bit.
-fn checksum(bytes: &[u8]) -> u32 {
-    !bytes.iter().fold(u32::MAX, |mut sum, byte| {
-        sum ^= u32::from(*byte);
-        for _ in 0..8 {
-            sum = (sum >> 1) ^ (0xEDB8_8320 * (sum & 1));
-        }
-        sum
-    })
-}
-
 /// A set as firmware before the present schema wrote it: another number, and constants
 /// that mean nothing here.
 fn old_set(name: &str, rig: &Rig) -> Vec<u8> {
@@ -142,7 +124,7 @@ fn old_set(name: &str, rig: &Rig) -> Vec<u8> {
     for byte in &mut set[rig_ends + 100..] {
         *byte = byte.wrapping_mul(3).wrapping_add(1);
     }
-    set.extend(checksum(&set).to_le_bytes());
+    set.extend(crc32(&set).to_le_bytes());
     set
 }
 
@@ -196,9 +178,8 @@ fn a_damaged_set_is_named_drives_nothing_and_can_be_restored() {
     let (said, driven) = powered(&flash, 1500);
     let complaints = said.iter().filter(|line| line.contains("the set is damaged")).count();
     assert!(complaints >= 2 && !driven, "{said:?}");
-    let asked = place.run(&["get"]);
-    let line = String::from_utf8_lossy(&asked.stderr).into_owned();
-    assert!(line.contains("the set in force is damaged"), "{line}");
+    let asked = place.run(&["get"]).text;
+    assert!(asked.contains("the set in force is damaged"), "{asked}");
     assert_eq!(place.good(&["restore"])["name"], "prototype");
     let (said, _) = powered(&place.flash(), 1500);
     assert!(said.iter().any(|line| line.contains("mode: idle")), "{said:?}");
@@ -213,7 +194,7 @@ fn unreadable_parameters_are_reported_and_can_be_restored() {
     set.truncate(set.len() - 4);
     // Behind the header, and not beyond the rig.
     set[30..length].fill(0xFF);
-    set.extend(checksum(&set).to_le_bytes());
+    set.extend(crc32(&set).to_le_bytes());
     let place = Place::new();
     flash_with(&set, &place.at("flash"));
     let line = place.refused(&["get"]);

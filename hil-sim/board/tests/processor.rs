@@ -65,8 +65,7 @@ fn a_conditional_block_may_be_interrupted_in_every_place() {
             machine.step_over_breakpoint();
             let until = machine.now() + PATIENCE;
             if machine.run_to(place, until).expect("runs") {
-                let now = machine.now();
-                machine.chip_mut().system.exceptions.pend(TIM3, now);
+                machine.chip_mut().system.exceptions.pend(TIM3);
                 interrupted += 1;
                 machine.run_until(until).expect("runs").expect("a breakpoint");
             }

@@ -4,11 +4,11 @@
 use hil_sim::faults::campaign::Case;
 use hil_sim::scenario::injection::{Kind, Target};
 use interstage::restart::{MissedCheckIns, Reset, Restart, Stopped};
-use interstage::sense::raw::SensorId;
 use interstage::supervise::Mode;
 use interstage::units::Direction;
 use rig_board::bench::STEP;
 use rig_board::core::Register;
+use rig_board::fault_injector::TaskSearch;
 use rig_board::faults::switch;
 use rig_board::peripherals::rcc::Cause;
 
@@ -19,11 +19,6 @@ fn hang(restart: &Restart) -> (u32, MissedCheckIns) {
         Some(Stopped::Hang { pc, missed, .. }) => (pc, missed),
         _ => panic!("{restart}"),
     }
-}
-
-/// The bridges go off within so many ms, and stay off.
-fn assert_cut(driven: &[bool], within: usize) {
-    assert!(!driven[within..].contains(&true), "{driven:?}");
 }
 
 #[test]
@@ -38,10 +33,7 @@ fn a_panic_is_reported_with_its_line_and_what_the_drive_did() {
         board.set(register, value);
     }
     board.set(Register::Pc, panics);
-    let (cause, after, driven) = board.reset(60);
-    assert_eq!(cause, Cause::Software);
-    assert!(after < 40, "{after} ms");
-    assert_cut(&driven, 2);
+    board.ends(Cause::Software, 40, 2);
     let restart = board.report();
     assert_eq!(restart.reset, Reset::Software);
     assert_eq!(restart.crash.expect("a crash").stopped, Stopped::Panic { place, line });
@@ -49,7 +41,7 @@ fn a_panic_is_reported_with_its_line_and_what_the_drive_did() {
     assert!(matches!(snapshot.mode(), Some(Mode::Run(Direction::Deploy, _))), "{snapshot:?}");
     assert!((snapshot.position.to_num::<f64>() - at).abs() < 0.3, "{snapshot:?} at {at}");
     for said in ["restarted by software", "panicked in line", "before: tick"] {
-        assert!(board.log.iter().any(|line| line.contains(said)), "{said}: {:#?}", board.log);
+        assert!(board.said(said), "{said}: {:#?}", board.log);
     }
 }
 
@@ -58,9 +50,7 @@ fn a_hard_fault_is_reported_with_where_and_why() {
     let mut board = Board::moving();
     // No memory.
     board.set(Register::Pc, 0x0900_0000);
-    let (cause, _, driven) = board.reset(60);
-    assert_eq!(cause, Cause::Software);
-    assert_cut(&driven, 2);
+    board.ends(Cause::Software, 60, 2);
     let restart = board.report();
     match restart.crash.expect("a crash").stopped {
         Stopped::Fault { pc, cfsr, hfsr, .. } => {
@@ -87,39 +77,19 @@ const TASKS: [(&str, &str, u64); 8] = [
 ];
 
 /// Runs the board to the next poll of a task, and so many cycles into it.
-fn into_poll(board: &mut Board, task: &str, cycles: u64) {
-    let polls = board.machine().tasks.polls().to_vec();
-    for poll in polls {
-        // Tasks of a pool have one function.
-        let mut others = 0;
-        for _ in 0..60 {
-            let machine = board.machine();
-            let until = (machine.now() / STEP + 1) * STEP;
-            if machine.run_to(poll, until).expect("runs") {
-                if machine.task() != Some(task) {
-                    machine.run_on(machine.now() + 1).expect("runs");
-                    others += 1;
-                    if others == SensorId::ANALOG.len() {
-                        break;
-                    }
-                    continue;
-                }
-                machine.run_on(machine.now() + cycles).expect("runs");
-                // A poll that only restarts its timer is over by now.
-                if machine.place().contains("Executor::run") {
-                    continue;
-                }
-                // A hang in a critical section is for the watchdog alone.
-                while machine.register(Register::Primask).expect("a register") & 1 != 0 {
-                    machine.run_on(machine.now() + 5).expect("runs");
-                }
-                return;
+fn into_poll(board: &mut Board, task: &'static str, cycles: u64) {
+    let mut search = TaskSearch::new(board.machine(), task, cycles);
+    for _ in 0..500 {
+        let until = (board.machine().now() / STEP + 1) * STEP;
+        let machine = board.machine();
+        if search.run(machine, until).expect("runs") {
+            // A hang in a critical section is for the watchdog alone.
+            while machine.register(Register::Primask).expect("a register") & 1 != 0 {
+                machine.run_on(machine.now() + 5).expect("runs");
             }
-            if board.bench.is_due() {
-                let (_, lines) = board.bench.close().expect("runs");
-                board.log.extend(lines.into_iter().map(|line| line.text));
-            }
+            return;
         }
+        board.step();
     }
     panic!("{task} is not polled");
 }
@@ -130,11 +100,8 @@ fn the_task_that_hangs_is_named_whichever_it_is() {
         let mut board = Board::moving();
         into_poll(&mut board, task, cycles);
         board.strike(fault(Target::Processor, Kind::Hung));
-        let (cause, after, driven) = board.reset(250);
-        assert_eq!(cause, Cause::Watchdog, "{task}");
         // Time until the task is missed, and that of the watchdog.
-        assert!(after <= 160, "{task}: {after} ms");
-        assert_cut(&driven, driven.len().min(135));
+        board.ends(Cause::Watchdog, 161, 135);
         let restart = board.report();
         assert_eq!(restart.reset, Reset::Watchdog, "{task}");
         let (pc, missed) = hang(&restart);
@@ -146,15 +113,13 @@ fn the_task_that_hangs_is_named_whichever_it_is() {
 #[test]
 fn an_interrupt_that_never_ceases_ends_in_a_reset_that_names_the_starved_tick() {
     let mut board = Board::moving();
-    // Between two ticks.
-    into_poll(&mut board, "journal", 300);
+    // Between two ticks the core sleeps.
+    let machine = board.machine();
+    machine.run_on(machine.now() + STEP / 2).expect("runs");
     let at = board.position_mm();
     board.strike(fault(Target::Interrupt, Kind::Flooding));
-    let (cause, after, driven) = board.reset(150);
-    assert_eq!(cause, Cause::Watchdog);
-    assert!(after <= 115, "{after} ms");
     // The system timer's interrupt is more urgent and cuts before the watchdog resets.
-    assert_cut(&driven, 85);
+    board.ends(Cause::Watchdog, 116, 85);
     let storm = fault(Target::Interrupt, Kind::Flooding);
     switch(board.machine(), &storm, false).expect("a fault");
     let restart = board.report();
@@ -163,18 +128,6 @@ fn an_interrupt_that_never_ceases_ends_in_a_reset_that_names_the_starved_tick() 
     assert_ne!(pc, 0);
     let on = board.position_mm() - at;
     assert!(on < 1.0, "it moved on by {on} mm");
-}
-
-#[test]
-fn interrupts_masked_for_good_end_in_a_reset_with_what_the_drive_did() {
-    let mut board = Board::moving();
-    board.set(Register::Primask, 1);
-    board.strike(fault(Target::Processor, Kind::Hung));
-    let (cause, _, _) = board.reset(150);
-    assert_eq!(cause, Cause::Watchdog);
-    let restart = board.report();
-    assert_eq!((restart.reset, restart.crash), (Reset::Watchdog, None));
-    assert!(matches!(restart.snapshot.and_then(|f| f.mode()), Some(Mode::Run(..))));
 }
 
 #[test]

@@ -142,25 +142,6 @@ impl Program {
     }
 }
 
-/// PB12, the first timer's break, is open after power-up in a world that pulls it low.
-#[test]
-fn a_break_clears_moe_after_its_filter_and_keeps_it_cleared() {
-    let mut program = Program::new();
-    program.set("TIM1.BDTR", &[("BKE", 1), ("BKP", 1), ("BKF", 15)]);
-    program.set("TIM1.BDTR", &[("MOE", 1)]);
-    assert!(program.is_set("TIM1.BDTR", "MOE"), "closed: low");
-    // Active low, so that the closed contact breaks.
-    program.set("TIM1.BDTR", &[("BKP", 0)]);
-    program.wait(255);
-    assert!(program.is_set("TIM1.BDTR", "MOE"), "shorter than eight samples at a 32nd");
-    program.wait(1);
-    assert!(!program.is_set("TIM1.BDTR", "MOE"));
-    assert!(program.is_set("TIM1.SR", "BIF"));
-    program.set("TIM1.BDTR", &[("MOE", 1)]);
-    assert!(!program.is_set("TIM1.BDTR", "MOE"), "not while the break is active");
-    assert_eq!(program.broken(), []);
-}
-
 #[test]
 fn clocks_are_ready_after_their_time_and_used_when_they_are_ready() {
     let mut program = Program::new();
@@ -278,7 +259,7 @@ fn requests_arrive_at_the_interrupts_of_the_description() {
     }
     fn failed_transfer(program: &mut Program, channel: usize) {
         program.set(&format!("DMA1.CH{channel}_CR"), &[("TEIE", 1)]);
-        program.chip.moved(channel - 1, false, program.now);
+        program.chip.moved(channel - 1, false);
     }
     let causes: [(&str, Cause); 9] = [
         ("EXTI0", |program| software(program, 0)),
@@ -346,7 +327,7 @@ fn commands_act_where_the_description_has_them() {
         }
     }
     for channel in 1..=8 {
-        program.chip.moved(channel - 1, false, program.now);
+        program.chip.moved(channel - 1, false);
         let [error, any] =
             ["TE", "G"].map(|name| field("DMA1.ISR", &format!("{name}IF{channel}"), 1));
         assert_eq!(program.read("DMA1.ISR"), error | any);

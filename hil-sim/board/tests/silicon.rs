@@ -1,7 +1,8 @@
 //! What the chip and the sensor on its bus do by their manuals, and a firmware has to know.
 
 use hil_sim::scenario::injection::{Injection, Kind, Target};
-use interstage::restart::Stopped;
+use interstage::restart::{Reset, Stopped};
+use interstage::supervise::Mode;
 use rig_board::bench::STEP;
 use rig_board::chip::description::flash::{self, acr};
 use rig_board::chip::description::{self, rcc};
@@ -27,14 +28,6 @@ fn a_reset_in_the_middle_of_a_frame_does_not_silence_the_angle_sensor() {
     }
     machine.restart(Cause::Pin).expect("restarts");
     board.until("mode: idle", 3000);
-}
-
-#[test]
-fn a_missing_magnet_is_named() {
-    let mut board = Board::off(&[]);
-    board.strike(fault(Target::Magnet, Kind::Gone));
-    board.until("fault 106", 3000);
-    assert!(board.said("magnet"), "{:#?}", board.log);
 }
 
 #[test]
@@ -88,9 +81,8 @@ fn a_stack_that_overflows_ends_at_the_protection_whatever_lies_below_ram() {
             board.set(Register::Pc, push);
         }
         board.set(Register::Sp, end + left);
-        let (_, after, driven) = board.reset(150);
-        assert!(!driven[2..].contains(&true), "{driven:?}");
-        assert!(after < 60, "the record ends it, not the watchdog: {after} ms");
+        // The record ends it, not the watchdog.
+        board.ends(Cause::Software, 60, 2);
         let restart = board.report();
         match restart.crash.expect("a crash").stopped {
             Stopped::Fault { cfsr, .. } => assert_ne!(cfsr & FORBIDDEN, 0, "{cfsr:#x}"),
@@ -135,10 +127,12 @@ fn the_watchdog_ends_a_hang_and_nothing_else_at_both_ends_of_its_oscillator() {
         let mut board = under_way();
         board.set(Register::Primask, 1);
         board.machine().hang().expect("hangs");
-        let (cause, after, _) = board.reset(150);
+        let after = board.ends(Cause::Watchdog, 150, 150);
         let timeout_ms = 3200.0 * 1e3 / hz as f64;
-        assert_eq!(cause, Cause::Watchdog, "{hz} Hz");
         assert!((timeout_ms - 1.5..=timeout_ms).contains(&f64::from(after)), "{hz} Hz: {after}");
+        let restart = board.report();
+        assert_eq!((restart.reset, restart.crash), (Reset::Watchdog, None), "{hz} Hz");
+        assert!(matches!(restart.snapshot.and_then(|f| f.mode()), Some(Mode::Run(..))));
         // Otherwise the software is earlier: bridges off, and the hang named.
         let mut board = under_way();
         let machine = board.machine();
@@ -339,9 +333,7 @@ fn two_wrong_bits_in_code_that_runs_end_it_and_are_no_emergency_stop() {
         // Its first whole double word: the one before is also another function's.
         let place = board.function(EVERY_MILLISECOND).next_multiple_of(8);
         board.machine().spoil(place, wrong).expect("a place");
-        let (cause, after, driven) = board.reset(150);
-        assert_eq!(cause, Cause::Software, "{:#?}", board.log);
-        assert!(after < 30 && !driven[2..].contains(&true), "{after} ms: {driven:?}");
+        board.ends(Cause::Software, 30, 2);
         board.run(600);
         assert!(!board.said("fault 151"), "{:#?}", board.log);
         match wrong {
@@ -361,13 +353,4 @@ fn one_wrong_bit_in_code_that_runs_is_corrected() {
     assert!(!board.said("] fault ") && board.machine().restarts().is_empty());
     let ecc = board.machine().chip_mut().flash.read(flash::ECCR, 0).expect("a register");
     assert_eq!(ecc >> 30, 1, "it was read, and corrected");
-}
-
-#[test]
-fn a_shorted_stop_wire_hides_the_button_until_the_motors_lack_their_supply() {
-    let mut board = Board::moving();
-    board.strike(fault(Target::StopWire, Kind::Shorted));
-    board.strike(fault(Target::StopWire, Kind::Off));
-    board.run(100);
-    assert!(!board.said("] fault "), "only the contact in the motors' supply cuts");
 }

@@ -4,15 +4,13 @@
 use interstage::fault::Fault;
 use interstage::restart::{Reset, Restart, Stopped};
 use interstage::supervise::{Command, Mode};
-use interstage::tick::Event;
 use interstage::units::Direction;
 
-use super::Board;
+use super::{Board, reports};
 use crate::chip::map::PARAMETER_SETS;
 use crate::error::BoardError;
 use crate::peripherals::rcc::Cause;
 use hil_sim::plant::rig::Truth;
-use hil_sim::record::Run;
 use hil_sim::scenario::Scenario;
 use hil_sim::session::RunningRig;
 
@@ -156,15 +154,9 @@ impl Hold {
         let Some((_, cause)) = board.bench.machine.restarts().first().copied() else {
             return Ok((Vec::new(), Some("no reset".to_owned())));
         };
-        let events = Run::of_stream(&board.frames).events;
-        let mut restarts = events.into_iter().filter_map(|entry| match entry.event {
-            Event::Restart(restart) => Some(restart),
-            _ => None,
-        });
         // The first power-up is reported as well.
-        let first = restarts.next();
-        let restart = restarts.next().or(first);
-        let unrecorded = self.record(cause, restart.as_ref());
+        let reports = reports(&board.frames);
+        let unrecorded = self.record(cause, reports.get(1).or(reports.first()));
         let mut harms = self.harms(scenario);
         harms.extend(next_run(board, scenario)?);
         let mut stored = vec![0; self.place.len()];

@@ -73,14 +73,14 @@ impl Bus for Chip {
 
     fn read_spoilt(&mut self, access: Access) {
         if self.flash.read_memory(access.address, access.size) {
-            self.system.exceptions.pend(NMI, access.now);
+            self.system.exceptions.pend(NMI);
             self.settle(access.now);
         }
     }
 
     fn write_code(&mut self, access: Access, value: u32) -> bool {
         self.flash.store(access.address, access.size, value);
-        self.settle_lines(access.now);
+        self.settle_lines();
         true
     }
 

@@ -147,29 +147,3 @@ pub fn writable(address: u32, ones: u32) -> (u32, u32) {
         _ => (u32::MAX, 0),
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_register_is_found_by_name_and_by_address_with_its_fields() {
-        let (address, register) = find("TIM8", "BDTR").expect("described");
-        assert_eq!((address, register.offset), (0x4001_3444, tim1::BDTR));
-        let moe = Field::new("MOE", 0x44, 15, 1, 'w');
-        assert!(register.fields.contains(&moe) && tim1::bdtr::MOE == moe && moe.mask == 1 << 15);
-        let layouts = |address| at(address).map(|(_, layouts)| layouts.count());
-        assert_eq!(layouts(0x4001_3418), Some(2), "compare and capture");
-        assert_eq!((layouts(0x4001_0800), layouts(0x3FFF_FFFC)), (Some(0), None));
-        assert_eq!(interrupt("DMA1_CH8"), Some(96));
-    }
-
-    #[test]
-    fn a_reserved_bit_is_one_that_no_field_has() {
-        let address = |peripheral, name| find(peripheral, name).expect("described").0;
-        let lock = address("GPIOC", "LCKR");
-        assert_eq!(writable(lock, 0xFFFE_0001), (0x1_FFFF, 0xFFFE_0000));
-        assert_eq!(writable(0xE000_ED08, u32::MAX), (u32::MAX, 0), "not described");
-        assert_eq!(writable(address("RCC", "CR"), 0).0 & 1 << 10, 0, "HSIRDY is only read");
-    }
-}

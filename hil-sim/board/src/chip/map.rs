@@ -111,22 +111,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn blocks_are_found_by_their_addresses() {
-        for (address, expected) in [
-            (0x4001_3434, Some(("TIM8", 0x34))),
-            (0x4800_0818, Some(("GPIOC", 0x18))),
-            (0x5000_0308, Some(("ADC1", 0x308))),
-            (0xE000_ED08, Some(("SCS", 0xD08))),
-            (0x4000_5000, None),
-            (0x4800_1C00, None),
-            (0x1000, None),
-        ] {
-            let found = find(address).map(|place| (place.block.name, place.offset));
-            assert_eq!(found, expected, "{address:#x}");
-        }
-    }
-
-    #[test]
     fn the_blocks_are_in_order_inside_the_ranges() {
         assert!(BLOCKS.is_sorted_by_key(|block| block.base));
         for &Block { base, bytes, .. } in &BLOCKS {

@@ -28,7 +28,8 @@ use unicorn_engine::{
 };
 
 use self::count::Count;
-use super::{Access as Touch, Bus, CoreError, Fault, Mark, Meter, NoBus, Register, Stop, passes};
+use super::{Access as Touch, Bus, CoreError, Fault, Mark, Meter, NoBus, Register, Stop};
+use crate::thumb::{Instruction, sweep};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Memory {
@@ -65,6 +66,16 @@ pub struct Counted<'a> {
     pub bytes: &'a [u8],
     /// Address ranges of instructions.
     pub code: &'a [std::ops::Range<u32>],
+}
+
+impl Counted<'_> {
+    /// Every instruction with its address, and whether it is conditional.
+    fn instructions(&self) -> impl Iterator<Item = (u32, Instruction, bool)> {
+        self.code.iter().flat_map(|range| {
+            let [from, to] = [range.start, range.end].map(|at| at.wrapping_sub(self.base) as usize);
+            sweep(self.bytes.get(from..to).unwrap_or_default(), range.start)
+        })
+    }
 }
 
 /// Interrupt number by which the engine reports a supervisor call.
@@ -115,9 +126,10 @@ pub struct UnicornCore<B: Bus + 'static = NoBus> {
 /// The engine as a hook sees it.
 type Hooked<'a, B> = Unicorn<'a, Inside<B>>;
 
-/// Names the request of an engine's error.
-fn engine<T>(what: &'static str, result: Result<T, impl std::fmt::Debug>) -> Result<T, CoreError> {
-    result.map_err(|error| CoreError::Engine { what, why: format!("{error:?}") })
+impl From<uc_error> for CoreError {
+    fn from(error: uc_error) -> Self {
+        Self::Engine(format!("{error:?}"))
+    }
 }
 
 /// Empties the IT state, which the engine has set to that of the access under way.
@@ -132,24 +144,21 @@ impl<B: Bus + 'static> UnicornCore<B> {
         let inside =
             Inside { count: Count::new(counted), bus, marks: Vec::new(), spoilt: Vec::new() };
         // The flag for the microcontroller profile would select another core.
-        let new = Unicorn::new_with_data(Arch::ARM, Mode::THUMB, inside);
         let mut core = Self {
-            engine: engine("start", new)?,
+            engine: Unicorn::new_with_data(Arch::ARM, Mode::THUMB, inside)?,
             guards: Vec::new(),
             own: Vec::new(),
             common: None,
             reads: None,
         };
-        let model = core.engine.ctl_set_cpu_model(ArmCpuModel::CORTEX_M4 as i32);
-        engine("select the core", model)?;
+        core.engine.ctl_set_cpu_model(ArmCpuModel::CORTEX_M4 as i32)?;
         core.translate_pages(memories)?;
         for memory in memories {
             let access = match memory.access {
                 Access::Code => Prot::READ | Prot::EXEC,
                 Access::Data => Prot::ALL,
             };
-            let mapped = core.engine.mem_map(memory.base.into(), memory.size.into(), access);
-            engine("map a memory", mapped)?;
+            core.engine.mem_map(memory.base.into(), memory.size.into(), access)?;
         }
         for (base, size) in ranges {
             core.map_bus(base, size)?;
@@ -172,12 +181,10 @@ impl<B: Bus + 'static> UnicornCore<B> {
     /// RAM it may. The host's accesses are not affected.
     pub fn set_guards(&mut self, guards: Vec<(u32, u32)>) -> Result<(), CoreError> {
         for (base, size) in std::mem::replace(&mut self.guards, guards) {
-            let freed = self.engine.mem_protect(base.into(), size.into(), Prot::ALL);
-            engine("free a memory", freed)?;
+            self.engine.mem_protect(base.into(), size.into(), Prot::ALL)?;
         }
         for (base, size) in &self.guards {
-            let kept = self.engine.mem_protect((*base).into(), (*size).into(), Prot::NONE);
-            engine("guard a memory", kept)?;
+            self.engine.mem_protect((*base).into(), (*size).into(), Prot::NONE)?;
         }
         Ok(())
     }
@@ -195,7 +202,7 @@ impl<B: Bus + 'static> UnicornCore<B> {
             return Ok(());
         }
         if let Some(hook) = self.reads.take() {
-            engine("remove a hook", self.engine.remove_hook(hook))?;
+            self.engine.remove_hook(hook)?;
         }
         let first = spoilt.first().map(|(base, _)| *base);
         let last = spoilt.last().map(|(base, size)| base + (size - 1));
@@ -207,10 +214,10 @@ impl<B: Bus + 'static> UnicornCore<B> {
                 uc.get_data_mut().look_for_spoilt(at as u32, size as u32);
                 forget_condition(uc).is_ok()
             });
-            self.reads = Some(engine("hook reads", read)?);
+            self.reads = Some(read?);
         }
         // Translated code calls such a hook only if it was there.
-        engine("forget code", self.engine.ctl_flush_tb())
+        Ok(self.engine.ctl_flush_tb()?)
     }
 
     /// Counts what the flash's wait states cost from now on, see [`crate::accelerator`]. Slow: the
@@ -218,13 +225,12 @@ impl<B: Bus + 'static> UnicornCore<B> {
     pub fn count_waits(&mut self, flash: Memory) -> Result<(), CoreError> {
         self.engine.get_data_mut().count.count_waits();
         let (first, last) = (flash.base.into(), (flash.base + (flash.size - 1)).into());
-        let read = self.engine.add_mem_hook(HookType::MEM_READ, first, last, |uc, _, at, _, _| {
+        self.engine.add_mem_hook(HookType::MEM_READ, first, last, |uc, _, at, _, _| {
             uc.get_data_mut().count.load(at as u32);
             forget_condition(uc).is_ok()
-        });
-        engine("hook reads", read)?;
+        })?;
         // Translated code calls such a hook only if it was there.
-        engine("forget code", self.engine.ctl_flush_tb())
+        Ok(self.engine.ctl_flush_tb()?)
     }
 
     /// Cycles that the flash would have cost since [`UnicornCore::count_waits`].
@@ -236,11 +242,11 @@ impl<B: Bus + 'static> UnicornCore<B> {
     /// searches for translated blocks at every write to RAM, which takes most of its time.
     /// Here RAM is data until the program executes in it.
     fn translate_pages(&mut self, memories: &[Memory]) -> Result<(), CoreError> {
-        engine("take over pages", self.engine.ctl_set_tlb_type(TlbType::VIRTUAL))?;
+        self.engine.ctl_set_tlb_type(TlbType::VIRTUAL)?;
         let data = memories.iter().filter(|m| m.access == Access::Data);
         let data: Vec<_> = data.map(|m| m.base..m.base + m.size).collect();
         let mut run = HashSet::new();
-        let filled = self.engine.add_tlb_hook(1, 0, move |uc, address, access| {
+        self.engine.add_tlb_hook(1, 0, move |uc, address, access| {
             let page = address as u32;
             if access == MemType::FETCH {
                 run.insert(page);
@@ -251,8 +257,8 @@ impl<B: Bus + 'static> UnicornCore<B> {
             // The engine checks the permissions of the memory itself.
             let perms = if is_data { Prot::READ | Prot::WRITE } else { Prot::ALL };
             Some(TlbEntry { paddr: address, perms })
-        });
-        engine("hook pages", filled).map(|_| ())
+        })?;
+        Ok(())
     }
 
     fn map_bus(&mut self, base: u32, size: u32) -> Result<(), CoreError> {
@@ -270,8 +276,7 @@ impl<B: Bus + 'static> UnicornCore<B> {
             let access = touch(uc, offset, size);
             uc.get_data_mut().bus.write(access, value as u32);
         };
-        let mapped = self.engine.mmio_map(base.into(), size.into(), Some(read), Some(write));
-        engine("map the bus", mapped)
+        Ok(self.engine.mmio_map(base.into(), size.into(), Some(read), Some(write))?)
     }
 
     /// Runs from `address` until a hook stops it or it gets to `until`.
@@ -327,25 +332,24 @@ fn name(register: Register) -> i32 {
 impl<B: Bus + 'static> UnicornCore<B> {
     /// Reads memory.
     pub fn read(&self, address: u32, into: &mut [u8]) -> Result<(), CoreError> {
-        engine("read memory", self.engine.mem_read(address.into(), into))
+        Ok(self.engine.mem_read(address.into(), into)?)
     }
 
     /// Writes memory, flash too.
     pub fn write(&mut self, address: u32, bytes: &[u8]) -> Result<(), CoreError> {
-        engine("write memory", self.engine.mem_write(address.into(), bytes))?;
+        self.engine.mem_write(address.into(), bytes)?;
         let count = &self.engine.get_data().count;
         if (address.wrapping_sub(count.base) as usize) < count.bytes.len() {
             // Discard the translation of changed code.
             let (from, to) = (u64::from(address & !0xFFF), u64::from(address) + bytes.len() as u64);
-            return engine("forget code", self.engine.ctl_remove_cache(from, to));
+            self.engine.ctl_remove_cache(from, to)?;
         }
         Ok(())
     }
 
     /// A register's value.
     pub fn register(&self, register: Register) -> Result<u32, CoreError> {
-        let value = engine("read a register", self.engine.reg_read(name(register)))?;
-        Ok(value as u32)
+        Ok(self.engine.reg_read(name(register))? as u32)
     }
 
     pub fn set_register(&mut self, register: Register, value: u32) -> Result<(), CoreError> {
@@ -353,11 +357,15 @@ impl<B: Bus + 'static> UnicornCore<B> {
         if register == Register::Xpsr {
             // The first name sets every field; only the second makes the engine apply the new
             // mode and state.
-            let all = uc.reg_write(RegisterARM::XPSR_NZCVQG, value.into());
-            engine("set a register", all)?;
-            return engine("set flags", uc.reg_write(RegisterARM::APSR_NZCV, value.into()));
+            uc.reg_write(RegisterARM::XPSR_NZCVQG, value.into())?;
+            return Ok(uc.reg_write(RegisterARM::APSR_NZCV, value.into())?);
         }
-        engine("set a register", uc.reg_write(name(register), value.into()))
+        Ok(uc.reg_write(name(register), value.into())?)
+    }
+
+    /// Whether the masks let an exception of this priority through.
+    pub fn unmasked(&self, priority: i16) -> bool {
+        hooks::unmasked(&self.engine, priority)
     }
 
     /// Runs from `address` until something stops the core, `cycles` at most.
@@ -367,9 +375,9 @@ impl<B: Bus + 'static> UnicornCore<B> {
 
     /// The same, or until the program gets to `until`. Slow: the engine translates again.
     pub fn run_to(&mut self, address: u32, cycles: u64, until: u32) -> Result<Stop, CoreError> {
-        engine("forget code", self.engine.ctl_flush_tb())?;
+        self.engine.ctl_flush_tb()?;
         let stop = self.go(address, cycles, u64::from(until & !1))?;
-        engine("forget code", self.engine.ctl_flush_tb())?;
+        self.engine.ctl_flush_tb()?;
         Ok(match stop {
             Stop::Wait(at) if at & !1 == until & !1 => Stop::Spent(at),
             stop => stop,

@@ -1,7 +1,7 @@
 //! Entry to and return from exceptions.
 
 use super::{Asleep, Machine, frame};
-use crate::core::{CoreError, Register, passes};
+use crate::core::{CoreError, Register};
 use crate::exceptions::number::HARD_FAULT;
 use crate::peripherals::system::Cause;
 
@@ -12,14 +12,9 @@ const CHAIN: u64 = 6;
 
 impl Machine {
     /// The exception to be taken now.
-    pub(super) fn takeable(&self) -> Result<Option<u8>, CoreError> {
-        let Some((number, priority)) = self.chip().system.exceptions.urgent() else {
-            return Ok(None);
-        };
-        let primask = self.core.register(Register::Primask)?;
-        let basepri = self.core.register(Register::Basepri)?;
-        let faultmask = self.core.register(Register::Faultmask)?;
-        Ok(passes(priority, primask, basepri, faultmask).then_some(number))
+    pub(super) fn takeable(&self) -> Option<u8> {
+        let (number, priority) = self.chip().system.exceptions.urgent()?;
+        self.core.unmasked(priority).then_some(number)
     }
 
     /// Takes an exception that returns to `back`. `chained`: directly after another one, with
@@ -55,13 +50,12 @@ impl Machine {
 
     /// Returns from the exception that runs.
     pub(super) fn leave(&mut self, value: u32) -> Result<(), CoreError> {
-        let now = self.now();
-        let left = self.chip_mut().system.exceptions.leave(now);
+        let left = self.chip_mut().system.exceptions.leave();
         self.profile.leave(self.clock());
         if left == HARD_FAULT {
             self.core.set_register(Register::Faultmask, 0)?;
         }
-        if let Some(next) = self.takeable()? {
+        if let Some(next) = self.takeable() {
             // The frame stays on the stack.
             self.core.set_register(Register::Lr, value)?;
             return self.enter(next, 0, true);
@@ -83,8 +77,7 @@ impl Machine {
         let masked = self.core.register(Register::Primask)? & 1 != 0;
         match self.chip_mut().system.fault(cause, masked) {
             Some(number) => {
-                let now = self.now();
-                self.chip_mut().system.exceptions.pend(number, now);
+                self.chip_mut().system.exceptions.pend(number);
                 self.enter(number, at, false)
             }
             None => {

@@ -54,18 +54,18 @@ impl Peripheral for Exti {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::peripherals::tests::write;
 
     #[test]
     fn the_selected_edge_is_kept_until_it_is_cleared() {
         let mut exti = Exti::new(0);
         let bit = 1 << 13;
-        let all = |value| Write { value, mask: u32::MAX };
-        exti.write(RTSR1, all(bit), 0).expect("modelled");
+        write(&mut exti, RTSR1, bit, 0);
         exti.sample(bit);
         assert!(!exti.requests(bit), "masked");
-        exti.write(IMR1, all(bit), 0).expect("modelled");
+        write(&mut exti, IMR1, bit, 0);
         assert!(exti.requests(0xFC00) && !exti.requests(0x3E0));
-        exti.write(PR1, all(bit), 0).expect("modelled");
+        write(&mut exti, PR1, bit, 0);
         exti.sample(0);
         assert!(!exti.requests(bit), "the other edge is not selected");
     }

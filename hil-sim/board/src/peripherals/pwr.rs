@@ -93,13 +93,14 @@ impl Peripheral for Pwr {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::peripherals::tests::write;
 
     #[test]
     fn a_low_supply_is_reported_while_the_detector_is_on() {
         let mut power = Pwr::default();
         power.fall(100, Then::Back);
         assert_eq!(power.read(SR2, 0), Some(0));
-        power.write(CR2, Write { value: cr2::PVDE.mask, mask: u32::MAX }, 0).expect("modelled");
+        write(&mut power, CR2, cr2::PVDE.mask, 0);
         assert!(power.signals_low());
         assert_eq!((power.read(SR2, 0), power.deadline()), (Some(sr2::PVDO.mask), 100));
         power.advance(100);

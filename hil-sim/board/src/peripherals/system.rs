@@ -10,7 +10,7 @@ mod tick;
 use super::{Peripheral, Write};
 use crate::chip::Why;
 use crate::exceptions::Exceptions;
-use crate::exceptions::number::INTERRUPT;
+use crate::exceptions::number::{INTERRUPT, SYS_TICK};
 
 pub use control::{Cause, Control};
 pub use mpu::Mpu;
@@ -93,14 +93,14 @@ impl Peripheral for System {
             0x010..=0x01C => self.tick.write(offset, write, now)?,
             0x100..=0x10C => self.exceptions.enable(word & 3, ones, true),
             0x180..=0x18C => self.exceptions.enable(word & 3, ones, false),
-            0x200..=0x20C => self.each(word & 3, ones, |all, number| all.pend(number, now)),
+            0x200..=0x20C => self.each(word & 3, ones, Exceptions::pend),
             0x280..=0x28C => self.each(word & 3, ones, Exceptions::clear),
             0x400..=0x464 => self.set_priorities(u32::from(INTERRUPT) + offset - 0x400, write),
             0xD18..=0xD20 => self.set_priorities(4 + offset - 0xD18, write),
             0xD90..=0xDA0 => self.mpu.write(offset, write)?,
             // Software trigger: the number of an interrupt.
-            0xF00 => self.exceptions.pend(INTERRUPT.saturating_add((ones & 0x1FF) as u8), now),
-            _ => self.control.write(offset, write, &mut self.exceptions, now)?,
+            0xF00 => self.exceptions.pend(INTERRUPT.saturating_add((ones & 0x1FF) as u8)),
+            _ => self.control.write(offset, write, &mut self.exceptions)?,
         }
         Ok(())
     }
@@ -112,7 +112,7 @@ impl Peripheral for System {
 
     fn advance(&mut self, now: u64) {
         if self.tick.advance(now) {
-            self.exceptions.pend(crate::exceptions::number::SYS_TICK, now);
+            self.exceptions.pend(SYS_TICK);
         }
     }
 }

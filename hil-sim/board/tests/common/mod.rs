@@ -1,16 +1,16 @@
 //! The firmware for the emulated board, built once, and a running board.
 
+pub(crate) mod cli;
+
 use std::sync::OnceLock;
 use std::time::Duration;
 
 use hil_sim::faults::campaign::{Case, FaultCampaign, Outcome, Twin};
 use hil_sim::firmware::{self, Profile};
 use hil_sim::probe::{Port, PortError};
-use hil_sim::record::Run;
 use hil_sim::scenario::Scenario;
 use hil_sim::scenario::injection::{Injection, Kind, Target};
 use interstage::restart::Restart;
-use interstage::tick::Event;
 use rig_board::bench::{Bench, Passed};
 use rig_board::campaign::{self, Firmware};
 use rig_board::chip::Pin;
@@ -237,6 +237,15 @@ impl Board {
         self.machine().set_register(register, value).expect("a register");
     }
 
+    /// Asserts that this resets the board within so many milliseconds, and that the drive is off
+    /// from the millisecond `cut` on; after how many the reset came.
+    pub(crate) fn ends(&mut self, cause: Cause, milliseconds: u32, cut: usize) -> u32 {
+        let (found, after, driven) = self.reset(milliseconds);
+        assert_eq!(found, cause, "{:#?}", self.log);
+        assert!(!driven.iter().skip(cut).any(|driven| *driven), "{driven:?}");
+        after
+    }
+
     /// Cause and time, ms, of the reset within so many milliseconds, and when the drive was on
     /// before it.
     pub(crate) fn reset(&mut self, milliseconds: u32) -> (Cause, u32, Vec<bool>) {
@@ -262,11 +271,35 @@ impl Board {
             }
             lines = self.log.len();
         }
-        let events = Run::of_stream(&std::mem::take(&mut self.frames)).events;
-        let mut reports = events.into_iter().filter_map(|entry| match entry.event {
-            Event::Restart(restart) => Some(restart),
-            _ => None,
-        });
-        reports.next_back().expect("a report")
+        let reports = campaign::reports(&std::mem::take(&mut self.frames));
+        *reports.last().expect("a report")
+    }
+}
+
+/// The probe at a board whose log is kept.
+impl Port for &mut Board {
+    fn up(&mut self, channel: u32) -> Result<Vec<u8>, PortError> {
+        self.bench.up(channel)
+    }
+
+    fn down(&mut self, channel: u32, bytes: &[u8]) -> Result<usize, PortError> {
+        self.bench.down(channel, bytes)
+    }
+
+    fn reset(&mut self) -> Result<(), PortError> {
+        Port::reset(&mut self.bench)
+    }
+
+    fn memory(&mut self, address: u32, into: &mut [u8]) -> Result<(), PortError> {
+        self.bench.memory(address, into)
+    }
+
+    fn pass(&mut self) -> Result<(), PortError> {
+        self.step();
+        Ok(())
+    }
+
+    fn now(&self) -> Duration {
+        self.bench.now()
     }
 }

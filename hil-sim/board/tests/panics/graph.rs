@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
-use rig_board::elf::{FLASH, Function, Loaded};
+use rig_board::elf::{FLASH, Function, Loaded, function_at};
 use rig_board::thumb;
 
 /// A branch out of a function.
@@ -53,19 +53,14 @@ fn flow(a: u16, b: Option<u16>, address: u32) -> Flow {
             _ if a & 0xF800 == 0xE000 => {
                 Flow::To(pc.wrapping_add(signed(u32::from(a & 0x7FF) << 1, 12)))
             }
-            // BLX; BX of anything but the link register, which returns.
-            _ if a & 0xFF87 == 0x4780 => Flow::Register,
+            // BLX, MOV into the program counter; BX of anything but the link register, which returns.
+            _ if matches!(a & 0xFF87, 0x4780 | 0x4687) => Flow::Register,
             _ if a & 0xFF87 == 0x4700 && a & 0x78 != 0x70 => Flow::Register,
-            // MOV into the program counter.
-            _ if a & 0xFF87 == 0x4687 => Flow::Register,
             _ => Flow::On,
         };
     };
     // Loads of the program counter from anywhere but the stack.
-    if a & 0xFFF0 == 0xF8D0 && b >> 12 == 0xF && a & 0xF != 0xD {
-        return Flow::Register;
-    }
-    if a & 0xFFF0 == 0xF850 && b >> 12 == 0xF && a & 0xF != 0xD {
+    if matches!(a & 0xFFF0, 0xF8D0 | 0xF850) && b >> 12 == 0xF && a & 0xF != 0xD {
         return Flow::Register;
     }
     if a & 0xF800 != 0xF000 || b & 0x8000 == 0 {
@@ -119,13 +114,6 @@ impl Graph {
     }
 }
 
-/// The function at an address.
-fn at(functions: &[Function], address: u32) -> Option<usize> {
-    let after = functions.partition_point(|f| f.range.start <= address);
-    let found = after.checked_sub(1)?;
-    functions[found].range.contains(&address).then_some(found)
-}
-
 /// Branches that leave a function.
 fn branches(image: &Loaded, functions: &[Function], function: &Function) -> Vec<Branch> {
     let mut found = Vec::new();
@@ -147,7 +135,7 @@ fn branches(image: &Loaded, functions: &[Function], function: &Function) -> Vec<
             match flow(first, second, address) {
                 Flow::To(to) if !function.range.contains(&to) => {
                     // The target of a branch outside every function is unknown.
-                    found.push(Branch { from: address, to: at(functions, to) });
+                    found.push(Branch { from: address, to: function_at(functions, to) });
                 }
                 Flow::Register => found.push(Branch { from: address, to: None }),
                 Flow::On | Flow::To(_) => {}
@@ -188,26 +176,4 @@ fn branches_lead_where_the_manual_says() {
     ] {
         assert_eq!(flow(a, b, at), expected, "{a:#x} {b:x?}");
     }
-}
-
-#[test]
-fn everything_reached_has_a_path() {
-    let function = |n: u32| Function { range: 16 * n..16 * n + 16, name: format!("f{n}") };
-    let to = |to| Branch { from: 0, to };
-    let graph = Graph {
-        functions: (0..6).map(function).collect(),
-        branches: vec![
-            vec![to(Some(1)), to(None)],
-            vec![to(Some(2)), to(Some(0))],
-            vec![to(Some(3))],
-            vec![to(Some(4))],
-            vec![],
-            vec![to(Some(0))],
-        ],
-    };
-    let reached = graph.reach(&[0], &|name| name == "f3");
-    assert_eq!(reached.keys().copied().collect::<Vec<_>>(), [0, 1, 2]);
-    assert_eq!(reached[&2], [0, 1, 2]);
-    assert_eq!(at(&graph.functions, 31), Some(1));
-    assert_eq!(at(&graph.functions, 96), None);
 }

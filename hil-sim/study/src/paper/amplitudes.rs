@@ -10,7 +10,7 @@ use super::claims::{
 };
 use super::experiment::{Experiment, Run, marks as mark_runs};
 use super::finite_elements::{self, Crossing};
-use super::histories::{Histories, Points, Quantity, stage_ends_mm};
+use super::histories::{Histories, Instant, Quantity, stage_ends_mm};
 use super::published::{AMPLITUDE_MM, CASES, COLLISION_N, STRESS};
 use super::simulation;
 use super::theory::{self, Drive, Lift};
@@ -272,16 +272,14 @@ fn resemblance(one: &Histories) -> f64 {
 fn first(case: &Case, run: &Run) -> Option<Lift> {
     let reading = run.crossings.first()?;
     let passed_mm = stage_ends_mm(case)[0];
-    let most = |points: &Points| {
-        let until = run.log.position_mm.iter().zip(points).take_while(|(mm, _)| **mm < passed_mm);
-        until.map(|(_, point)| point.1).fold(0.0, f64::max)
-    };
+    let before = run.log.instants.iter().take_while(|now| now.position_mm < passed_mm);
+    let most = |of: fn(&Instant) -> f64| before.clone().map(of).fold(0.0, f64::max);
     Some(Lift {
         gap_mm: reading.gap_mm,
         depth_mm: reading.depth_mm,
         area_mm2: reading.area_mm2,
-        collision_n: most(&run.log.collision),
-        impact_kpa: most(&run.log.impact),
+        collision_n: most(|now| now.collision_n),
+        impact_kpa: most(|now| now.impact_kpa),
     })
 }
 

@@ -4,6 +4,7 @@ use anyhow::Result;
 
 use super::case::{Arms, Case};
 use super::experiment::{Experiment, STAGES, groups};
+use super::measure::LEAVES_MM;
 use super::published::LOG_S;
 use super::{simulation, theory};
 use crate::figure::{Chart, SOURCES, Series, Source};
@@ -13,9 +14,6 @@ const MODELS: [Source; 2] = [Source::Theory, Source::Simulation];
 
 /// One of this many points of theory and simulation is shown.
 const SHOWN_OF: usize = 8;
-
-/// Travel over which the contact patch leaves an edge, mm.
-const LEAVES_MM: f64 = 8.0;
 
 /// Travel of a deployment before the first corner is touched, mm.
 const BEFORE_MM: f64 = 3.0;
@@ -54,7 +52,7 @@ impl Histories {
         let case = experiment.case;
         let arms = Arms::of(&case)?;
         // All means are as long as the shortest log of all runs.
-        let lines = experiment.runs.iter().map(|run| run.log.collision.len()).min().unwrap_or(0);
+        let lines = experiment.runs.iter().map(|run| run.log.instants.len()).min().unwrap_or(0);
         let mean = |group: &Vec<usize>| {
             let logs: Vec<&History> = group.iter().map(|&rig| &experiment.runs[rig].log).collect();
             History::mean(&logs, lines)
@@ -80,21 +78,21 @@ impl Histories {
     }
 
     /// Values of a quantity from a source.
-    pub fn points(&self, quantity: Quantity, source: Source) -> &Points {
-        quantity.of(self.history(source))
+    pub fn points(&self, quantity: Quantity, source: Source) -> Points {
+        self.history(source).points(quantity)
     }
 
     /// Largest value in each of the three transitions. They are told apart by where the wheel
     /// is: the experiment's is slower than the case while its preload rises.
     pub fn peaks(&self, quantity: Quantity, source: Source) -> [Peak; STAGES] {
-        let positions_mm = &self.history(source).position_mm;
-        let points = self.points(quantity, source);
+        let peak = |now: &Instant| {
+            let Instant { time_s, position_mm, .. } = *now;
+            Peak { time_s, position_mm, value: quantity.of(now) }
+        };
         let ends_mm = stage_ends_mm(&self.case);
         std::array::from_fn(|stage| {
             let from_mm = if stage == 0 { 0.0 } else { ends_mm[stage - 1] };
-            let all = positions_mm.iter().zip(points);
-            let all =
-                all.map(|(&position_mm, &(time_s, value))| Peak { time_s, position_mm, value });
+            let all = self.history(source).instants.iter().map(peak);
             let within = all.filter(|p| (from_mm..ends_mm[stage]).contains(&p.position_mm));
             within.fold(Peak::default(), |most, p| if p.value > most.value { p } else { most })
         })
@@ -111,11 +109,10 @@ impl Histories {
         // The wheel's patch behind the last edge, and the arm's ring-down.
         let after = stage_ends_mm(&self.case)[STAGES - 1] + LEAVES_MM + 0.2 * self.case.speed_mm_s;
         SOURCES.map(|source| {
-            let points = self.points(quantity, source);
             let most = |from: f64, to: f64| {
-                let all = self.history(source).position_mm.iter().zip(points);
-                let within = all.filter(|(position_mm, _)| (from..=to).contains(*position_mm));
-                within.map(|(_, p)| p.1.abs()).fold(0.0, f64::max)
+                let all = self.history(source).instants.iter();
+                let within = all.filter(|now| (from..=to).contains(&now.position_mm));
+                within.map(|now| quantity.of(now).abs()).fold(0.0, f64::max)
             };
             (most(after, f64::INFINITY) - most(f64::NEG_INFINITY, BEFORE_MM)).max(0.0)
                 / most(f64::NEG_INFINITY, f64::INFINITY)
@@ -124,8 +121,8 @@ impl Histories {
 
     pub fn panel(&self, quantity: Quantity) -> Chart {
         let title = format!("{} {}", ["(a)", "(b)", "(c)"][quantity as usize], self.case.name());
-        let means = self.means.iter().map(|mean| quantity.of(mean).clone());
-        let of = |source| Series::new(source, thin(self.points(quantity, source)));
+        let means = self.means.iter().map(|mean| mean.points(quantity));
+        let of = |source| Series::new(source, thin(&self.points(quantity, source)));
         let series = MODELS.map(of).into_iter().chain(Series::means(means)).collect();
         Chart::new(title, "time, s", quantity.axis(), series)
     }
@@ -185,9 +182,9 @@ pub struct Instant {
     pub time_s: f64,
     /// Axial position of the wheel, mm.
     pub position_mm: f64,
-    /// Collision force, N.
+    /// Collision force: the axial force of the contact beyond rolling resistance, N.
     pub collision_n: f64,
-    /// Impact stress, kPa.
+    /// Impact stress: that force over the surface that the step cuts off, at the hub, kPa.
     pub impact_kpa: f64,
     /// Deflection of the arm at the wheel, um.
     pub arm_um: f64,
@@ -196,76 +193,64 @@ pub struct Instant {
     pub clearance_mm: Option<f64>,
 }
 
-/// A deployment, one point an interval: collision and impact at its time, of the arm's
-/// deflection the largest in the interval before.
+/// A deployment, an instant an interval: the arm's deflection is the largest in the interval
+/// before.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct History {
-    /// Axial position of the wheel, mm.
-    pub position_mm: Vec<f64>,
-    /// Axial force of the contact beyond rolling resistance, N.
-    pub collision: Points,
-    /// That force over the surface that the step cuts off, at the hub, kPa.
-    pub impact: Points,
-    /// Deflection of the arm, um.
-    pub vibration: Points,
-    /// Clearance at the step ahead, mm; not a number where there is none.
-    pub clearance: Points,
+    pub instants: Vec<Instant>,
     largest_um: f64,
 }
 
 impl History {
-    /// Takes an instant not before the last; whether it makes a point.
+    /// Takes an instant not before the last; whether it is kept.
     pub fn push(&mut self, now: &Instant, interval_s: f64) -> bool {
         self.largest_um = self.largest_um.max(now.arm_um.abs());
-        let due_s = self.collision.len() as f64 * interval_s;
-        if now.time_s < due_s - 1e-9 {
+        if now.time_s < self.instants.len() as f64 * interval_s - 1e-9 {
             return false;
         }
-        self.position_mm.push(now.position_mm);
-        self.collision.push((now.time_s, now.collision_n));
-        self.impact.push((now.time_s, now.impact_kpa));
-        self.vibration.push((now.time_s, self.largest_um));
-        self.clearance.push((now.time_s, now.clearance_mm.unwrap_or(f64::NAN)));
-        self.largest_um = 0.0;
+        self.instants.push(Instant { arm_um: std::mem::take(&mut self.largest_um), ..*now });
         true
     }
 
     /// The mean of the first `lines` of some logs.
     pub(super) fn mean(logs: &[&Self], lines: usize) -> Self {
-        let mean = |of: fn(&Self) -> &Points| {
-            let sum = |line: usize| logs.iter().map(|log| of(log)[line].1).sum::<f64>();
-            let point = |line| (line as f64 * LOG_S, sum(line) / logs.len() as f64);
-            (0..lines).map(point).collect()
+        let instant = |line: usize| {
+            let mean = |of: fn(&Instant) -> f64| {
+                logs.iter().map(|log| of(&log.instants[line])).sum::<f64>() / logs.len() as f64
+            };
+            Instant {
+                time_s: line as f64 * LOG_S,
+                position_mm: mean(|now| now.position_mm),
+                collision_n: mean(|now| now.collision_n),
+                impact_kpa: mean(|now| now.impact_kpa),
+                arm_um: mean(|now| now.arm_um),
+                // Where all have one.
+                clearance_mm: Some(mean(|now| now.clearance_mm.unwrap_or(f64::NAN))),
+            }
         };
-        let position = |line| {
-            let sum = logs.iter().map(|log| log.position_mm[line]).sum::<f64>();
-            sum / logs.len() as f64
-        };
-        Self {
-            position_mm: (0..lines).map(position).collect(),
-            collision: mean(|log| &log.collision),
-            impact: mean(|log| &log.impact),
-            vibration: mean(|log| &log.vibration),
-            clearance: mean(|log| &log.clearance),
-            largest_um: 0.0,
-        }
+        Self { instants: (0..lines).map(instant).collect(), largest_um: 0.0 }
+    }
+
+    fn points(&self, quantity: Quantity) -> Points {
+        self.instants.iter().map(|now| (now.time_s, quantity.of(now))).collect()
     }
 
     /// Clearance at the first step before this time, s, where there is one.
     pub(super) fn clearance_until(&self, end_s: f64) -> Points {
-        let shown = |p: &(f64, f64)| p.0 < end_s && p.1.is_finite();
-        self.clearance.iter().copied().filter(shown).collect()
+        let clearance = |now: &Instant| Some((now.time_s, now.clearance_mm?));
+        let points = self.instants.iter().filter_map(clearance);
+        points.filter(|(time_s, mm)| *time_s < end_s && mm.is_finite()).collect()
     }
 }
 
-/// One of the quantities of a [`History`].
+/// One of the quantities of an [`Instant`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quantity {
-    /// [`History::collision`].
+    /// [`Instant::collision_n`].
     Collision,
-    /// [`History::impact`].
+    /// [`Instant::impact_kpa`].
     Impact,
-    /// [`History::vibration`].
+    /// [`Instant::arm_um`].
     Vibration,
 }
 
@@ -278,8 +263,8 @@ impl Quantity {
         ["collision, N", "impact, kPa", "vibration, µm"][self as usize]
     }
 
-    pub(super) fn of(self, history: &History) -> &Points {
-        [&history.collision, &history.impact, &history.vibration][self as usize]
+    fn of(self, now: &Instant) -> f64 {
+        [now.collision_n, now.impact_kpa, now.arm_um][self as usize]
     }
 }
 
@@ -307,8 +292,8 @@ mod tests {
             let now = Instant { time_s, arm_um, collision_n: time_s, ..Instant::default() };
             assert_eq!(history.push(&now, INTERVAL_S), index % 10 == 0);
         }
-        assert_eq!(history.vibration.iter().map(|p| p.1).fold(0.0, f64::max), 9.0);
-        assert!((history.collision[7].1 - 0.07).abs() < 1e-9);
+        assert_eq!(history.instants.iter().map(|now| now.arm_um).fold(0.0, f64::max), 9.0);
+        assert!((history.instants[7].collision_n - 0.07).abs() < 1e-9);
         assert!(history.clearance_until(1.0).is_empty());
     }
 }

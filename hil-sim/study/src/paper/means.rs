@@ -22,8 +22,7 @@ pub struct Means {
 }
 
 impl Means {
-    /// Means of `figure` over the sweep, whose variable `x` picks from the case, on a
-    /// grid of `count`.
+    /// Means of `figure` over the sweep, whose variable `x` picks from the case, at these places.
     ///
     /// Rigs that lack a reading are fitted without it; one with fewer than three is left
     /// out.
@@ -31,19 +30,13 @@ impl Means {
         sweep: &[&Experiment],
         x: impl Fn(&Experiment) -> f64,
         figure: impl Fn(&Reading) -> f64,
-        count: usize,
+        at: &[f64],
     ) -> Self {
-        let places: Vec<f64> = sweep.iter().map(|experiment| x(experiment)).collect();
-        let (from, to) = (places[0], places[places.len() - 1]);
-        let at: Vec<f64> =
-            (0..count).map(|i| from + (to - from) * i as f64 / (count - 1) as f64).collect();
         let rigs = sweep.iter().map(|experiment| experiment.runs.len()).min().unwrap_or(0);
         let curves: Vec<Option<Curve>> = (0..rigs)
             .map(|rig| {
-                let readings = sweep.iter().zip(&places);
-                let points: Vec<(f64, f64)> =
-                    readings.filter_map(|(e, &x)| Some((x, e.runs[rig].mean(&figure)?))).collect();
-                parabola(&points)
+                let point = |e: &&Experiment| Some((x(e), e.runs[rig].mean(&figure)?));
+                parabola(&sweep.iter().filter_map(point).collect::<Vec<_>>())
             })
             .collect();
         let value = |curve: &Curve, x: f64| curve[0] + x * (curve[1] + x * curve[2]);
@@ -58,7 +51,7 @@ impl Means {
         let range = at.iter().filter_map(range_at).collect();
         let curves =
             groups().iter().map(|group| at.iter().map(|&x| mean(group, x)).collect()).collect();
-        Self { at, curves, range }
+        Self { at: at.to_vec(), curves, range }
     }
 
     /// Mean of the four means.
@@ -160,7 +153,8 @@ mod tests {
 
     fn means(experiments: &[Experiment]) -> Means {
         let all: Vec<&Experiment> = experiments.iter().collect();
-        Means::of(&all, |e| e.case.speed_mm_s, |reading| reading.gap_mm, 11)
+        let at: Vec<f64> = (0..11).map(|i| 3.0 + 0.5 * f64::from(i)).collect();
+        Means::of(&all, |e| e.case.speed_mm_s, |reading| reading.gap_mm, &at)
     }
 
     #[test]

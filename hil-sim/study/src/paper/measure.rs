@@ -8,9 +8,10 @@
 
 use hil_sim::plant::rig::VirtualRig;
 use hil_sim::plant::rolling;
+use hil_sim::plant::wall::LocalWall;
 
 /// Distance behind an edge, mm, over which the patch leaves it: the next corner is farther.
-const LEAVES_MM: f64 = 8.0;
+pub(super) const LEAVES_MM: f64 = 8.0;
 
 /// Rolling resistance over radial force of this plant on the continuous wall at this
 /// speed, mm/s, and pressing force, N.
@@ -49,8 +50,7 @@ pub fn impact_kpa(plant: &VirtualRig, collision_n: f64) -> f64 {
     let ring = &parameters.ring;
     let height = truth.height_mm - local.base_mm;
     let size = (ring.radius_mm, ring.width_mm);
-    let ahead = corner_area_mm2(size, local.ahead_mm, height - local.rise_mm);
-    let area = if ahead > 0.0 { ahead } else { corner_area_mm2(size, -local.behind_mm, height) };
+    let area = step_area_mm2(size, &local, height);
     // Elements of the plant's ring touch as a whole.
     stress_kpa(collision_n, area.max(ring.pitch_mm() * size.1))
 }
@@ -58,6 +58,13 @@ pub fn impact_kpa(plant: &VirtualRig, collision_n: f64) -> f64 {
 /// Force over area, kPa; 0 where nothing touches.
 pub fn stress_kpa(force_n: f64, area_mm2: f64) -> f64 {
     if area_mm2 > 0.0 { 1e3 * force_n / area_mm2 } else { 0.0 }
+}
+
+/// [`corner_area_mm2`] of the step that the wheel is on, the one ahead if it is touched, with the
+/// centre at this height above the wall under it, mm.
+pub fn step_area_mm2(size: (f64, f64), wall: &LocalWall, height_mm: f64) -> f64 {
+    let ahead = corner_area_mm2(size, wall.ahead_mm, height_mm - wall.rise_mm);
+    if ahead > 0.0 { ahead } else { corner_area_mm2(size, -wall.behind_mm, height_mm) }
 }
 
 /// Part of the undeformed surface of a wheel of this radius and width that face and top

@@ -5,7 +5,7 @@ use interstage::rig::Rig;
 use super::claims::{row, table};
 use super::published::{CONSTRAINED_HZ, FREE_HZ};
 use crate::figure::{Chart, Claim, Figure, Mark, Series, Source};
-use crate::reference::beam::{Beam, BeamError, Ends, Shape, Tip};
+use crate::reference::beam::{Beam, BeamError, Ends, Shape, Tip, bisect};
 
 /// Points of a mode shape.
 const POINTS: usize = 60;
@@ -158,18 +158,9 @@ fn free_equation(b: f64, mass: f64) -> f64 {
     1.0 - b.cos() * b.cosh() - mass * b * (b.cos() * b.sinh() - b.sin() * b.cosh())
 }
 
-/// Root of a function that changes sign once in `range`, to the last bit or so.
-fn root(f: impl Fn(f64) -> f64, (mut low, mut high): (f64, f64)) -> f64 {
-    let rising = f(high) > f(low);
-    for _ in 0..60 {
-        let middle = 0.5 * (low + high);
-        if (f(middle) > 0.0) == rising {
-            high = middle;
-        } else {
-            low = middle;
-        }
-    }
-    0.5 * (low + high)
+/// Root of a function that changes sign once in a range.
+fn root(f: impl Fn(f64) -> f64, (low, high): (f64, f64)) -> f64 {
+    bisect(low, high, f(high).signum(), f)
 }
 
 /// Shape of a beam clamped at 0 with a free end or a point mass at 1.

@@ -1,6 +1,7 @@
 //! What the study publishes as numbers. Its tables and the images of its figures are
 //! not part of its text; nothing is read off them here.
 
+pub use crate::reference::vibration::{CONSTRAINED_HZ, FREE_HZ};
 pub use hil_sim::identify::published::{AMPLITUDE_MM, CASES};
 
 /// Finite-element collision force of the first three of [`CASES`], N (its Fig. 13).
@@ -9,12 +10,6 @@ pub const COLLISION_N: [f64; 3] = [56.5261, 51.2358, 58.5963];
 /// Finite-element impact stress of the same (its Fig. 14). Printed as Pa; the unit is
 /// doubtful, so that only ratios are used.
 pub const STRESS: [f64; 3] = [66.7738, 63.6418, 69.3387];
-
-/// First constrained mode of the rig, Hz (its Fig. 19).
-pub const CONSTRAINED_HZ: f64 = 276.0;
-
-/// Seventh free mode of the rig, Hz (its Fig. 19).
-pub const FREE_HZ: f64 = 163.0;
 
 /// Least useful speed, mm/s.
 pub const LEAST_SPEED_MM_S: f64 = 2.9741;

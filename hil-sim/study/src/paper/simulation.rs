@@ -6,17 +6,12 @@ use anyhow::Result;
 use super::case::{Arms, Case};
 use super::histories::{History, INTERVAL_S, Instant};
 use super::measure::{corner_area_mm2, stress_kpa};
-use super::theory::{Drive, Lift};
+use super::theory::{Drive, Lift, setup};
 use crate::reference::collision::dynamic;
 use crate::reference::impact::Rod;
 use crate::reference::{ReferenceCase, Rubber};
 use hil_sim::plant::balance::{Axial, BalanceError};
-use hil_sim::plant::crossing::{CrossingCase, cross};
-
-/// Elements of the ring and axial travel of a step, mm, of single crossings: the gap is
-/// within 0.2 % of the converged one.
-const ELEMENTS: usize = 2880;
-const STRIDE_MM: f64 = 0.01;
+use hil_sim::rollout::CrossingSetup;
 
 /// Distance before a step at which its crossing begins, mm: touch, and a tenth of a radius.
 const BEGINS_MM: f64 = 16.1;
@@ -30,27 +25,17 @@ const QUIET_S: f64 = 1e-3;
 /// The area is the part of the wheel that the step cuts off, as a compression sensor
 /// would have it: elements of the ring enter and leave as a whole.
 pub fn lift(case: &Case, drive: Drive, level: usize) -> Result<Lift, BalanceError> {
-    let rig = case.loads.rig();
-    let (axial, preload_n) = match drive {
-        Drive::Pushed => (Axial::Pushed, case.preload_n),
-        Drive::Driven => (Axial::Driven(case.load_n()), case.pressing_n(level)),
+    let CrossingSetup { preload_n, load_n, .. } = setup(case, drive, level);
+    let reference = ReferenceCase {
+        axial: load_n.map_or(Axial::Pushed, Axial::Driven),
+        ..ReferenceCase::new(case.loads.rig(), case.speed_mm_s, preload_n)
     };
-    let of = (case.speed_mm_s, preload_n, axial);
-    let crossing = CrossingCase::of(&rig, (ELEMENTS, STRIDE_MM), of);
-    let result = cross(&crossing)?;
+    let result = reference.still()?;
     let (x, y) = result.lift;
-    let area = corner_area_mm2(
-        (crossing.ring.radius_mm, crossing.ring.width_mm),
-        -x,
-        y - crossing.step_height_mm,
-    );
-    Ok(Lift {
-        gap_mm: result.gap_mm,
-        depth_mm: result.lift_depth_mm,
-        area_mm2: area,
-        collision_n: result.corner_force_n,
-        impact_kpa: stress_kpa(result.corner_force_n, area),
-    })
+    let rig = &reference.rig.rig;
+    let size = (rig.wheel_radius_mm, rig.wheel_width_mm);
+    let area = corner_area_mm2(size, -x, y - rig.step_height_mm);
+    Ok(Lift::new((result.gap_mm, result.lift_depth_mm), area, result.corner_force_n))
 }
 
 /// Cells of the tread in which waves run to the hub.

@@ -168,7 +168,7 @@ impl Sweep {
             })
             .collect::<Result<_>>()?;
         let means = |reading: fn(&Reading) -> f64| {
-            Means::of(experiments, |e| variable.of(&e.case), reading, GRID)
+            Means::of(experiments, |e| variable.of(&e.case), reading, &at)
         };
         type Pick = (fn(&Lift) -> f64, fn(&Reading) -> f64);
         let curves = |name, unit, published: [f64; 2], (lift, reading): Pick| Curves {

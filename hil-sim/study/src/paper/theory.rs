@@ -7,7 +7,7 @@ use interstage::units::Direction;
 
 use super::case::{Arms, Case};
 use super::histories::{History, INTERVAL_S, Instant};
-use super::measure::{corner_area_mm2, stress_kpa};
+use super::measure::{corner_area_mm2, step_area_mm2, stress_kpa};
 use hil_sim::plant::balance::{Axial, Balance};
 use hil_sim::plant::ring::{Motion, Ring, RingParameters};
 use hil_sim::plant::wall::{Step, Wall};
@@ -37,6 +37,14 @@ pub struct Lift {
     pub impact_kpa: f64,
 }
 
+impl Lift {
+    /// With this gap and depth, mm, area, mm^2, and collision force, N.
+    pub fn new((gap_mm, depth_mm): (f64, f64), area_mm2: f64, collision_n: f64) -> Self {
+        let impact_kpa = stress_kpa(collision_n, area_mm2);
+        Self { gap_mm, depth_mm, area_mm2, collision_n, impact_kpa }
+    }
+}
+
 /// How the wheel crosses from sleeve `level`.
 pub fn setup(case: &Case, drive: Drive, level: usize) -> CrossingSetup {
     let (preload_n, load_n) = match drive {
@@ -53,13 +61,7 @@ pub fn lift(case: &Case, drive: Drive, level: usize) -> Result<Lift> {
     let crossed = crossed.context("a wheel that sinks in has no gap")?;
     let size = (rig.rig.wheel_radius_mm, rig.rig.wheel_width_mm);
     let area = corner_area_mm2(size, crossed.ahead_mm, crossed.above_mm);
-    Ok(Lift {
-        gap_mm: crossed.gap_mm,
-        depth_mm: crossed.depth_mm,
-        area_mm2: area,
-        collision_n: crossed.corner_force_n,
-        impact_kpa: stress_kpa(crossed.corner_force_n, area),
-    })
+    Ok(Lift::new((crossed.gap_mm, crossed.depth_mm), area, crossed.corner_force_n))
 }
 
 /// The same, mean over the three stages.
@@ -132,10 +134,7 @@ pub fn deployment(case: &Case, arms: &Arms) -> Result<History> {
         ring.commit(&Motion { height_mm: height, ..motion });
         // Nothing resists the rolling of an elastic wheel.
         let collision_n = solved.contact.sine_n.max(0.0);
-        let size = (radius, tread.width_mm);
-        let ahead = corner_area_mm2(size, local.ahead_mm, height - local.rise_mm);
-        let area =
-            if ahead > 0.0 { ahead } else { corner_area_mm2(size, -local.behind_mm, height) };
+        let area = step_area_mm2((radius, tread.width_mm), &local, height);
         let now = Instant {
             time_s: x / case.speed_mm_s,
             position_mm: x,

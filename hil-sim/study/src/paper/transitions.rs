@@ -70,7 +70,8 @@ pub fn claims(data: &Data) -> Vec<Claim> {
     let seconds = |times: BySource| times.map(|t| format!("{t:.2}")).join(", ");
     let until = fast.first_passed_s + 0.25;
     let humps = SOURCES.map(|source| {
-        let first = fast.points(Vibration, source).iter().take_while(|p| p.0 <= until);
+        let points = fast.points(Vibration, source);
+        let first = points.iter().take_while(|p| p.0 <= until);
         count_humps(first.map(|p| p.1), 0.05)
     });
     let pairs = |related: fn(&Case, &Case) -> bool, sense| {
@@ -166,8 +167,8 @@ pub(super) fn count_humps(values: impl Iterator<Item = f64> + Clone, part: f64) 
 fn likeness(one: &Histories, quantity: Quantity) -> f64 {
     let theory = one.points(quantity, Source::Theory);
     let against = |source| {
-        let points = one.points(quantity, source).iter();
-        let pairs = points.filter_map(|&(t, y)| Some((y, at(theory, t)?)));
+        let points = one.points(quantity, source).into_iter();
+        let pairs = points.filter_map(|(t, y)| Some((y, at(&theory, t)?)));
         correlation(&pairs.collect::<Vec<_>>())
     };
     against(Source::Simulation).min(against(Source::Experiment))
@@ -176,7 +177,7 @@ fn likeness(one: &Histories, quantity: Quantity) -> f64 {
 /// Least correlation with the collision within a source.
 fn following(one: &Histories, quantity: Quantity) -> f64 {
     let within = |source| {
-        let pairs = one.points(Collision, source).iter().zip(one.points(quantity, source));
+        let pairs = one.points(Collision, source).into_iter().zip(one.points(quantity, source));
         correlation(&pairs.map(|(a, b)| (a.1, b.1)).collect::<Vec<_>>())
     };
     SOURCES.map(within).into_iter().fold(1.0, f64::min)

@@ -23,6 +23,7 @@ use serde::Serialize;
 
 use waves::{End, Load, frequency_function};
 
+pub(crate) use roots::bisect;
 pub use shapes::Shape;
 
 /// Most modes that may be asked for.

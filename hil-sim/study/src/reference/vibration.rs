@@ -18,10 +18,10 @@ use super::collision::Crossing;
 #[cfg(test)]
 mod tests;
 
-/// First constrained mode of the rig, Hz. Published.
+/// First constrained mode of the rig, Hz. Published (its Fig. 19).
 pub const CONSTRAINED_HZ: f64 = 276.0;
 
-/// Seventh free mode of the rig, Hz: the first that deforms it. Published.
+/// Seventh free mode of the rig, Hz: the first that deforms it. Published (its Fig. 19).
 pub const FREE_HZ: f64 = 163.0;
 
 /// Loss factor of the bolted arm. Chosen: hysteresis of the alloy is a hundredth of

@@ -63,14 +63,9 @@ impl Count {
     pub(super) fn new(counted: &Counted<'_>) -> Self {
         let halfwords = counted.bytes.len() / 2;
         let mut deferred = vec![None; halfwords];
-        for range in counted.code {
-            let from = range.start.wrapping_sub(counted.base) as usize;
-            let to = range.end.wrapping_sub(counted.base) as usize;
-            let code = counted.bytes.get(from..to).unwrap_or_default();
-            for (address, instruction, conditional) in thumb::sweep(code, range.start) {
-                if timing::is_deferred(&instruction, conditional) {
-                    deferred[(address - counted.base) as usize / 2] = Some(instruction.kind);
-                }
+        for (address, instruction, conditional) in counted.instructions() {
+            if timing::is_deferred(&instruction, conditional) {
+                deferred[(address - counted.base) as usize / 2] = Some(instruction.kind);
             }
         }
         Self {

@@ -4,9 +4,9 @@ use unicorn_engine::{HookType, RegisterARM};
 
 use super::{
     BREAKPOINT, Bus, CALL, CoreError, Counted, Fault, Hooked, Inside, Mark, RETURN, RETURN_BITS,
-    Register, SEV, Stop, Touch, UnicornCore, WFE, engine, forget_condition, name, passes,
+    Register, SEV, Stop, Touch, UnicornCore, WFE, forget_condition, name,
 };
-use crate::thumb::{self, Kind};
+use crate::thumb::Kind;
 use crate::timing;
 
 /// Cycles without a new block after which the code in use is taken to be translated.
@@ -19,22 +19,16 @@ impl<B: Bus + 'static> UnicornCore<B> {
     /// Hooks what is counted, reported or has to stop the program.
     pub(super) fn hook(&mut self, counted: &Counted<'_>) -> Result<(), CoreError> {
         let uc = &mut self.engine;
-        let blocks = uc.add_block_hook(1, 0, |uc, address, size| {
+        uc.add_block_hook(1, 0, |uc, address, size| {
             let Inside { count, bus, .. } = uc.get_data_mut();
             let now = count.meter.cycles;
             // What stops here is not executed and so not counted.
-            if now >= count.limit || now >= bus.deadline() {
-                halt(uc, Stop::Spent(address as u32));
-                return;
-            }
-            if let Some(priority) = bus.urgent()
-                && unmasked(uc, priority)
-            {
-                halt(uc, Stop::Urgent(address as u32));
-                return;
+            let (at, spent) = (address as u32, now >= count.limit || now >= bus.deadline());
+            let urgent = bus.urgent();
+            if spent || urgent.is_some_and(|priority| unmasked(uc, priority)) {
+                return halt(uc, Stop::Spent(at));
             }
             let count = &mut uc.get_data_mut().count;
-            let at = address as u32;
             let block = match count.known(at, size) {
                 Some(block) => block,
                 None if count.wants_hooks(at, size) => return halt(uc, Stop::Spent(at)),
@@ -48,9 +42,8 @@ impl<B: Bus + 'static> UnicornCore<B> {
             if !inside.spoilt.is_empty() {
                 inside.look_for_spoilt(at, size);
             }
-        });
-        engine("hook blocks", blocks)?;
-        let traps = uc.add_intr_hook(|uc, number| {
+        })?;
+        uc.add_intr_hook(|uc, number| {
             let at = uc.pc_read().unwrap_or_default() as u32;
             let stop = match number {
                 CALL => Stop::Call(at),
@@ -59,10 +52,9 @@ impl<B: Bus + 'static> UnicornCore<B> {
                 _ => Stop::Fault { at, fault: Fault::Other },
             };
             halt(uc, stop);
-        });
-        engine("hook interrupts", traps)?;
+        })?;
         // Waiting for an event arrives here, with the program counter behind it.
-        let invalid = uc.add_insn_invalid_hook(|uc| {
+        uc.add_insn_invalid_hook(|uc| {
             let at = uc.pc_read().unwrap_or_default() as u32 & !1;
             let mut before = [0; 2];
             let read = uc.mem_read(u64::from(at.wrapping_sub(2)), &mut before);
@@ -71,12 +63,11 @@ impl<B: Bus + 'static> UnicornCore<B> {
                 return true;
             }
             false
-        });
-        engine("hook waiting", invalid)?;
+        })?;
         let (first, last) = (counted.base, counted.base + (counted.bytes.len() as u32 - 1));
         let (first, last) = (first.into(), last.into());
         let kind = HookType::MEM_WRITE_PROT;
-        let protected = uc.add_mem_hook(kind, first, last, |uc, _, address, size, value| {
+        uc.add_mem_hook(kind, first, last, |uc, _, address, size, value| {
             let access = Touch {
                 address: address as u32,
                 size: size as u32,
@@ -84,25 +75,18 @@ impl<B: Bus + 'static> UnicornCore<B> {
                 now: uc.get_data().count.meter.cycles,
             };
             uc.get_data_mut().bus.write_code(access, value as u32) && forget_condition(uc).is_ok()
-        });
-        engine("hook writes to code", protected)?;
-        for range in counted.code {
-            let bytes = (range.start.wrapping_sub(counted.base) as usize)
-                ..(range.end.wrapping_sub(counted.base) as usize);
-            let code = counted.bytes.get(bytes).unwrap_or_default();
-            for (address, instruction, _) in thumb::sweep(code, range.start) {
-                let at = (address - range.start) as usize;
-                if instruction.size == 2 && code.get(at..at + 2) == Some(&SEV[..]) {
-                    let at = u64::from(address);
-                    let sent =
-                        self.engine.add_code_hook(at, at, |uc, _, _| uc.get_data_mut().bus.event());
-                    engine("hook an instruction", sent)?;
-                }
+        })?;
+        for (address, instruction, _) in counted.instructions() {
+            let at = (address - counted.base) as usize;
+            if instruction.size == 2 && counted.bytes.get(at..at + 2) == Some(&SEV[..]) {
+                let at = u64::from(address);
+                uc.add_code_hook(at, at, |uc, _, _| uc.get_data_mut().bus.event())?;
             }
         }
         // Where there is but one such hook the engine calls it by itself, and would do so
         // when it is gone.
-        engine("hook an instruction", self.engine.add_code_hook(1, 1, |_, _, _| {})).map(|_| ())
+        uc.add_code_hook(1, 1, |_, _, _| {})?;
+        Ok(())
     }
 
     /// Hooks the instructions that the program has come to, see [`Count::wants_hooks`].
@@ -112,7 +96,7 @@ impl<B: Bus + 'static> UnicornCore<B> {
         for (address, kind) in std::mem::take(&mut self.engine.get_data_mut().count.wanted) {
             self.hook_deferred(address, kind)?;
             let at = u64::from(address);
-            engine("forget code", self.engine.ctl_remove_cache(at, at + 2))?;
+            self.engine.ctl_remove_cache(at, at + 2)?;
         }
         Ok(())
     }
@@ -125,7 +109,7 @@ impl<B: Bus + 'static> UnicornCore<B> {
                 spend(uc, kind);
             }
         });
-        self.own.push((address, engine("hook an instruction", hooked)?));
+        self.own.push((address, hooked?));
         self.engine.get_data_mut().count.hooked.push((address, kind));
         Ok(())
     }
@@ -150,7 +134,7 @@ impl<B: Bus + 'static> UnicornCore<B> {
                     own.into_iter().partition(|(at, _)| count.begins(*at));
                 self.own = kept;
                 for (_, hook) in gone {
-                    engine("remove a hook", self.engine.remove_hook(hook))?;
+                    self.engine.remove_hook(hook)?;
                 }
                 let common = self.engine.add_code_hook(first.into(), last.into(), |uc, at, _| {
                     match uc.get_data().count.deferred(at as u32) {
@@ -158,7 +142,7 @@ impl<B: Bus + 'static> UnicornCore<B> {
                         None => uc.get_data_mut().count.needless += 1,
                     }
                 });
-                self.common = Some(engine("hook all instructions", common)?);
+                self.common = Some(common?);
             }
             Some(hook) if count.needless > count.patience => {
                 count.patience = count.patience.saturating_mul(2);
@@ -170,7 +154,7 @@ impl<B: Bus + 'static> UnicornCore<B> {
                     std::mem::take(&mut count.hooked).into_iter().partition(|(at, _)| there(*at));
                 count.hooked = kept;
                 self.common = None;
-                engine("remove a hook", self.engine.remove_hook(hook))?;
+                self.engine.remove_hook(hook)?;
                 for (address, kind) in again {
                     self.hook_deferred(address, kind)?;
                 }
@@ -208,12 +192,15 @@ fn note<B>(uc: &mut Hooked<'_, B>, address: u32) {
 }
 
 /// Whether the masks let an exception of this priority through.
-fn unmasked<B>(uc: &Hooked<'_, B>, priority: i16) -> bool {
-    let read = |register: RegisterARM| uc.reg_read(register).unwrap_or_default() as u32;
-    passes(
-        priority,
-        read(RegisterARM::PRIMASK),
-        read(RegisterARM::BASEPRI),
-        read(RegisterARM::FAULTMASK),
-    )
+///
+/// Source: ARMv7-M Architecture Reference Manual, B1.5.4 (`ExecutionPriority`).
+pub(super) fn unmasked<B>(uc: &Hooked<'_, B>, priority: i16) -> bool {
+    let read = |register: RegisterARM| uc.reg_read(register).unwrap_or_default() & 0xFF;
+    let level = match read(RegisterARM::BASEPRI) {
+        _ if read(RegisterARM::FAULTMASK) != 0 => -1,
+        _ if read(RegisterARM::PRIMASK) != 0 => 0,
+        0 => i16::MAX,
+        level => level as i16,
+    };
+    priority < level
 }

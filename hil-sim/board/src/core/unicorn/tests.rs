@@ -43,7 +43,9 @@ fn code_costs_its_cycles() {
     const CONDITIONAL: &[u16] = &[0x2900, 0xBF04, 0xE890, 0x001C, 0xFBB6, 0xF5F7];
     /// sdiv r1, r2, r3
     const DIVISION: &[u16] = &[0xFB92, 0xF1F3];
-    let cases: [Priced; 9] = [
+    /// udiv r1, r2, r3
+    const UNSIGNED: &[u16] = &[0xFBB2, 0xF1F3];
+    let cases: [Priced; 12] = [
         // adds r1, r1, #1; ldr r2, [r0]; push {r1, r2, r3}; ldrd r4, r5, [r0]
         (&[0x3101, 0x6802, 0xB40E, 0xE9D0, 0x4500], &[], (1 + 2 + 4 + 3, 4)),
         (BRANCH, &[(1, 0)], (2 + REFILL, 2)),
@@ -52,7 +54,10 @@ fn code_costs_its_cycles() {
         (CONDITIONAL, &[(1, 1)], (4, 4)),
         (CONDITIONAL, &[(1, 0), (6, u32::MAX), (7, 1)], (2 + 4 + 12, 4)),
         (DIVISION, &[(2, -5_i32 as u32), (3, 7)], (2, 1)),
+        (DIVISION, &[(2, -1_i32 as u32), (3, 1)], (3, 1)),
         (DIVISION, &[(2, i32::MIN as u32), (3, 1)], (12, 1)),
+        (UNSIGNED, &[(2, 5), (3, 0)], (2, 1)),
+        (UNSIGNED, &[(2, u32::MAX), (3, 1)], (12, 1)),
         // movs r1, #3; subs r1, #1; bne to the subtraction
         (&[0x2103, 0x3901, 0xD1FD], &[], (1 + 3 * 2 + 2 * REFILL, 7)),
         // vdiv.f32 s0, s1, s2; vadd.f32 s0, s0, s1; vfma.f32 s0, s1, s2

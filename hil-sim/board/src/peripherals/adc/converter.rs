@@ -8,13 +8,13 @@ use crate::rules::Rule;
 
 /// Converter clocks that a calibration takes, from its end to the enabling, and from the enabling
 /// to `ADRDY`: a conversion.
-pub(super) const CALIBRATION: u64 = 116;
-pub(super) const REST: u64 = 4;
-pub(super) const STABILISATION: u64 = 15;
+const CALIBRATION: u64 = 116;
+const REST: u64 = 4;
+const STABILISATION: u64 = 15;
 /// Core cycles that the regulator takes to start: 20 us.
-pub(super) const REGULATOR_START: u64 = 20 * (HZ / 1_000_000);
+const REGULATOR_START: u64 = 20 * (HZ / 1_000_000);
 /// Highest clock of a converter, Hz.
-pub(super) const HIGHEST_CLOCK: u64 = 60_000_000;
+const HIGHEST_CLOCK: u64 = 60_000_000;
 
 /// Registers that the model has whole.
 const WHOLE: [u32; 22] = [

@@ -1,4 +1,3 @@
-use super::converter::*;
 use super::*;
 use crate::chip::description::{adc1::*, bits};
 use crate::peripherals::tests::write;
@@ -10,26 +9,24 @@ fn take(adc: &mut Adc, offset: u32, value: u32, now: u64) -> Result<(), Why> {
     adc.write(offset, Write { value, mask: u32::MAX }, now)
 }
 
-/// A cycle after which a converter that was started at cycle 0 is ready.
+/// When conversions begin.
 const BEGIN: u64 = 5_000;
 
-/// Regulator, calibration, enabling, each in its time.
-fn start(adc: &mut Adc, base: u32) {
-    write(adc, base + CR, REGULATOR, 0);
-    write(adc, base + CR, REGULATOR | cr::ADCAL.mask, REGULATOR_START);
-    adc.advance(adc.deadline());
-    let rested = REGULATOR_START + (CALIBRATION + REST) * adc.clock();
-    write(adc, base + CR, REGULATOR | cr::ADEN.mask, rested);
-    let flags = adc.read(base + ISR, BEGIN).expect("modelled");
-    assert!(isr::ADRDY.is_in(flags));
+/// A pair at a quarter of the core's clock, of which one is calibrated, enabled and ready.
+fn started(converter: usize) -> Adc {
+    let mut adc = Adc::default();
+    write(&mut adc, CCR, 2 << 18, 0);
+    let one = &mut adc.converters[converter];
+    one.registers.put(cr::ADVREGEN, 1);
+    one.registers.put(cr::ADEN, 1);
+    (one.calibrated, one.regulated, one.ready) = (true, 0, 0);
+    adc
 }
 
 /// ADC2 on channel 9, 256 conversions of 12.5 + 12.5 clocks at a quarter of the
 /// core's, DMA on.
 fn ready() -> Adc {
-    let mut adc = Adc::default();
-    write(&mut adc, CCR, 2 << 18, 0);
-    start(&mut adc, 0x100);
+    let mut adc = started(1);
     for (offset, value) in
         [(0x100 + CFGR, 1), (0x100 + CFGR2, 0x9D), (0x100 + SMPR1, 2 << 27), (0x100 + SQR1, 9 << 6)]
     {
@@ -102,9 +99,7 @@ fn after_an_overrun_it_requests_dma_only_when_the_flag_is_cleared() {
 
 #[test]
 fn injected_conversions_follow_one_another_into_registers_of_their_own() {
-    let mut adc = Adc::default();
-    write(&mut adc, CCR, 2 << 18, 0);
-    start(&mut adc, 0);
+    let mut adc = started(0);
     for (offset, value) in [
         (CFGR2, 8 << 5 | 7 << 2 | cfgr2::JOVSE.mask),
         (SMPR1, 2 << 3),

@@ -152,13 +152,12 @@ impl Control {
         offset: u32,
         write: Write,
         exceptions: &mut Exceptions,
-        now: u64,
     ) -> Result<(), Why> {
         match offset {
             ICSR => {
                 for (bit, number) in [(28, PEND_SV), (26, SYS_TICK)] {
                     if write.ones() >> bit & 1 != 0 {
-                        exceptions.pend(number, now);
+                        exceptions.pend(number);
                     } else if write.ones() >> (bit - 1) & 1 != 0 {
                         exceptions.clear(number);
                     }
@@ -189,7 +188,7 @@ mod tests {
 
     fn write(control: &mut Control, exceptions: &mut Exceptions, offset: u32, value: u32) {
         let all = Write { value, mask: u32::MAX };
-        control.write(offset, all, exceptions, 0).expect("modelled");
+        control.write(offset, all, exceptions).expect("modelled");
     }
 
     #[test]

@@ -143,6 +143,7 @@ impl Peripheral for Counter {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::peripherals::tests::write;
 
     fn all(value: u32) -> Write {
         Write { value, mask: u32::MAX }
@@ -166,11 +167,11 @@ mod tests {
     fn the_cycle_counter_counts_while_it_is_on() {
         let mut counter = Counter::default();
         assert_eq!(counter.read(CYCCNT, 500), Some(0));
-        counter.write(CTRL, all(4 << 28 | 1), 1000).expect("modelled");
+        write(&mut counter, CTRL, 4 << 28 | 1, 1000);
         assert_eq!(counter.read(CYCCNT, 1250), Some(250));
-        counter.write(CYCCNT, all(7), 2000).expect("modelled");
+        write(&mut counter, CYCCNT, 7, 2000);
         assert_eq!(counter.read(CYCCNT, 2003), Some(10));
-        counter.write(CTRL, all(0), 2010).expect("modelled");
+        write(&mut counter, CTRL, 0, 2010);
         assert_eq!(counter.read(CYCCNT, 9999), Some(17));
     }
 }

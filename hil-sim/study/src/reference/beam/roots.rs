@@ -65,7 +65,7 @@ fn lower_bound(a: End, mass: f64, spring: f64) -> f64 {
 /// The sign change of `f` between `low` and `high`, to the last bit, where `f` has the
 /// sign `sign_high` at `high` and the other at `low`. That is known beforehand and not
 /// looked up, so a root on an edge of the interval is found as well.
-fn bisect(mut low: f64, mut high: f64, sign_high: f64, f: impl Fn(f64) -> f64) -> f64 {
+pub(crate) fn bisect(mut low: f64, mut high: f64, sign_high: f64, f: impl Fn(f64) -> f64) -> f64 {
     loop {
         let middle = 0.5 * (low + high);
         if middle <= low || middle >= high {

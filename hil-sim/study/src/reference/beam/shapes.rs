@@ -29,11 +29,15 @@ impl Shape {
     /// Range: 0 to the length. Error: 1e-8 of the largest deflection while
     /// `beta_l > 0.1`; a soft spring's rigid mode below that cancels the more.
     pub fn at(&self, x_m: f64) -> f64 {
-        let part = x_m / self.length_m;
+        self.waves(x_m / self.length_m).re
+    }
+
+    /// Both waves at this part of the length.
+    fn waves(&self, part: f64) -> Complex<f64> {
         let beta_l = self.mode.beta_l;
         let waves = propagation(beta_l * part) * self.from_a
             + propagation(beta_l * (1.0 - part)) * self.from_b;
-        waves.sum().re
+        waves.sum()
     }
 
     /// Deflection at end B, 1/sqrt(kg).
@@ -70,13 +74,7 @@ impl Beam {
     /// Turns the shape real, to unit modal mass, its tip positive.
     fn normalise(&self, shape: &mut Shape, tip_mass_kg: f64) {
         // The phase is the same everywhere; seen best where the deflection is largest.
-        let beta_l = shape.mode.beta_l;
-        let complex = |part: f64| {
-            let waves = propagation(beta_l * part) * shape.from_a
-                + propagation(beta_l * (1.0 - part)) * shape.from_b;
-            waves.sum()
-        };
-        let parts = (0..=200).map(|i| complex(f64::from(i) / 200.0));
+        let parts = (0..=200).map(|i| shape.waves(f64::from(i) / 200.0));
         let largest =
             parts.fold(Complex::new(0.0, 0.0), |a, b| if b.norm() > a.norm() { b } else { a });
         shape.scale(largest.conj() / largest.norm_sqr());

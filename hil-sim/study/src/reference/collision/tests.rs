@@ -9,6 +9,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::reference::Resolution;
+use crate::reference::beam::bisect;
 
 /// An elastic wheel and a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -79,7 +80,7 @@ impl Elastic {
     /// Bisection to the last bit: the force falls steadily as the centre rises.
     fn height_mm(&self, x_mm: f64, preload_n: f64) -> f64 {
         let (low, high) = (self.step_height_mm, 2.0 * self.radius_mm);
-        bisect(low, high, |y| self.forces(x_mm, y).radial_n() > preload_n)
+        bisect(low, high, 1.0, |y| preload_n - self.forces(x_mm, y).radial_n())
     }
 
     /// The gap, mm: at lift-off the centre is at y = R, so that
@@ -93,23 +94,8 @@ impl Elastic {
         if carried(nearest) < preload_n {
             return None;
         }
-        let x = bisect(-r, nearest, |x| carried(x) < preload_n);
+        let x = bisect(-r, nearest, 1.0, |x| carried(x) - preload_n);
         Some(x.hypot(r) - r)
-    }
-}
-
-/// Where `below` stops holding between `low` and `high`.
-fn bisect(mut low: f64, mut high: f64, below: impl Fn(f64) -> bool) -> f64 {
-    loop {
-        let middle = 0.5 * (low + high);
-        if middle <= low || middle >= high {
-            return middle;
-        }
-        if below(middle) {
-            low = middle;
-        } else {
-            high = middle;
-        }
     }
 }
 
