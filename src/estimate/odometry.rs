@@ -23,7 +23,7 @@ const PER_REACH: Q16 = q16(15_625);
 /// of a compound and a hub that make it 0.7 to 1.4 times as compliant.
 const UNKNOWN_WINDING: Ratio = q16(1_333_000);
 /// The same of its creep, of the same compliance and of a contact that is 0.25 longer or shorter.
-const UNKNOWN_CREEP: Ratio = q16(2_330_000);
+const UNKNOWN_CREEP: Ratio = q16(4_080_000);
 /// Largest correction of the travel, relative.
 const MOST_SCALE: Ratio = q16(20_000);
 /// The same of winding up and creep.
