@@ -123,7 +123,8 @@ pub struct Slide {
     travelled: Millimetres,
     /// Largest compression, mm.
     deepest: Millimetres,
-    /// The most that the tread has given way by, mm.
+    /// What the tread has given way by, and all that it has so far, out and back, mm.
+    given: Option<Millimetres>,
     gave: Millimetres,
     begin: Option<Face>,
     /// Begin and end of the slide, if the wheel landed at the end.
@@ -146,7 +147,8 @@ impl Slide {
         let turned = self.travel.map_or(Travel::ZERO, |travel| travel.saturating_sub(at.travel));
         self.travelled += Q16::narrow(turned) * divide(over, radius - at.depth).min(Ratio::ONE);
         self.travel = Some(at.travel);
-        self.gave = self.gave.max(at.gave);
+        let given = self.given.replace(at.gave).unwrap_or(at.gave);
+        self.gave += (at.gave - given).abs();
         let face = Face {
             by_largest: edge(self.deepest) - self.travelled,
             as_read: edge(at.depth) - self.travelled,
