@@ -166,7 +166,9 @@ impl Controller {
         output.rearm = false;
         output.events.clear();
         let acceleration = state.acceleration();
-        let sensed = self.senses.step(&mut state.senses, input.now, &input.sensors, acceleration);
+        let mut sensed =
+            self.senses.step(&mut state.senses, input.now, &input.sensors, acceleration);
+        state.estimate.rim(&mut sensed);
         self.estimator.begin_tick(&mut state.estimate, &sensed);
         let arm_thrust = self.arm_coupling * self.load_of(state) * sensed.tan_arm;
         let tick =
@@ -197,6 +199,7 @@ impl Controller {
             now: tick.now,
             mode: state.mode,
             sensed: tick.sensed,
+            travel: state.estimate.driven(tick.sensed),
             bridges: input.sensors.bridges,
             speed_ref: state.signed_speed(),
             preload_due: state.preload_loop.due(),
@@ -231,6 +234,7 @@ impl Controller {
     /// Follows steps and corners while the drive moves.
     fn follow_contact(&self, state: &mut State, tick: &mut TickContext<'_>) {
         if !state.mode.moves() {
+            state.estimate.stand(tick.sensed);
             return;
         }
         let plan = state.planning.plan.as_ref();
@@ -239,6 +243,7 @@ impl Controller {
             now: tick.now,
             sensed: tick.sensed,
             pressed: tick.pressed(),
+            load: self.load_of(state),
             duty: state.speed_loop.duty(),
             most_pressed: most - tick.sensed.preload_filtered <= self.schedule.reached_within,
             standing_since: state.approach.standing_since,

@@ -10,11 +10,6 @@ use crate::units::{Direction, Millimetres, Q16, q16};
 /// the tolerance of a sleeve, 0.05.
 const HEIGHT_SEEN: Millimetres = q16(120_000);
 
-/// Largest slide at a landing that may go unseen, mm: the least that counts, and its sigma.
-const UNSEEN: Millimetres = q16(515_000);
-/// What a step that was made with care is off by at most, mm.
-const MACHINED: Millimetres = q16(300_000);
-
 impl Estimator {
     /// Largest residual of a step that is where the table has it, mm: its tolerance, and three
     /// sigma of the position.
@@ -58,12 +53,8 @@ impl Estimator {
             found.fault.get_or_insert(Fault::StepsDisagree);
             residual
         } else {
-            // One alone: the step is displaced, or as likely slides that went unseen have added up.
-            let unseen = UNSEEN * Q16::from_num(self.steps.count().saturating_sub(step)) + MACHINED;
-            let outwards = state.direction == Direction::Retract && residual > Q16::ZERO;
-            if outwards && residual <= unseen {
-                state.odometry.slip(Q16::ZERO, residual.half());
-            }
+            // One alone: the step is displaced, or as likely the wheel.
+            state.odometry.slip(Q16::ZERO, residual.half());
             state.displaced = Some((step, residual));
             report_displaced(state, residual, found);
             residual
@@ -126,6 +117,10 @@ impl Estimator {
                 };
                 if let Some(landing) = landing.filter(|landing| landing.slid > Q16::ZERO) {
                     state.odometry.slip(Q16::ZERO, landing.sigma());
+                }
+                if higher.abs() > HEIGHT_SEEN {
+                    // The height moves the face, and is read on a wall that is not there.
+                    state.odometry.slip(Q16::ZERO, shift.half());
                 }
                 point.face += left;
                 point.residual += left;

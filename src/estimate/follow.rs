@@ -5,6 +5,7 @@ use super::crossing::{Contact, CrossingEvent, Lift, WatchInput};
 use super::landing::OnEdge;
 use super::odometry::Rolling;
 use super::tread::Rolls;
+use super::wind_up::Pulled;
 use super::{EstimateState, Estimator, Expectation, Findings, LiftPoint, OpenCrossing, Position};
 use crate::fault::{Fault, Limit};
 use crate::model::LimitedBy;
@@ -24,6 +25,8 @@ pub struct Follow<'a> {
     pub sensed: &'a SensedState,
     /// Radial force on the wheel, N.
     pub pressed: Newtons,
+    /// Axial load on it, N, inwards.
+    pub load: Newtons,
     /// Duty of the drive in the last tick.
     pub duty: Ratio,
     /// The preload is as high as it may be.
@@ -59,16 +62,16 @@ impl Estimator {
         let seen = self.watch_input(state, tick.sensed);
         let event = self.watch.step(&mut state.watch, direction, &seen);
         let on_corner = state.on_corner();
-        let creep = self.creep.outwards(tick.pressed);
         let rolling = Rolling {
             radius: tick.sensed.radius.value,
-            lag: self.worn
-                + self.rolling_lag * tick.sensed.compression_filtered
-                + creep * Q16::from_num(direction.sign()),
+            lag: self.worn + self.rolling_lag * tick.sensed.compression_filtered,
             on_corner,
         };
         state.odometry.roll(tick.sensed.travel, &rolling, event.is_some());
         state.begin_tick(tick.sensed.travel);
+        let pulled = self.pulled(state, tick);
+        let (wind_up, odometry) = (&mut state.wind_up, &mut state.odometry);
+        self.pulls.step(wind_up, odometry, tick.sensed.travel, &pulled);
         if let Some(open) = state.crossing.as_mut() {
             open.peak_preload = open.peak_preload.max(tick.sensed.preload_filtered);
         }
@@ -90,12 +93,50 @@ impl Estimator {
         self.feel(state, tick.sensed);
         self.hold_to_corner(state, tick);
         if state.watch.contact == Contact::Wall || state.known.is_searching() {
-            let (travel, compression) = (tick.sensed.travel, tick.sensed.compression_filtered);
-            let (speed, duty, pressed) = (tick.sensed.speed.value, tick.duty, tick.pressed);
+            let (travel, speed) = state.turns(tick.sensed);
+            let (duty, pressed) = (tick.duty, tick.pressed);
+            let compression = tick.sensed.compression_filtered;
             let rolls = Rolls { direction, travel, speed, duty, pressed, compression };
             found.shown = self.tread.roll(&mut state.tread, &rolls);
         }
         found
+    }
+
+    /// What pulls at the tread, and where.
+    fn pulled(&self, state: &EstimateState, tick: &Follow<'_>) -> Pulled {
+        let seen = self.watch_input(state, tick.sensed);
+        let ahead = match &state.crossing {
+            Some(open) => {
+                let face = open.lift.map(|point| point.face).or(open.felt);
+                face.or(self.steps.face(open.step)).map(|face| face - state.position)
+            }
+            // A wheel that goes over an edge is on it before that shows.
+            None if state.direction == Direction::Retract => self.distance(state).map(|d| -d),
+            None => None,
+        };
+        let ahead = ahead.unwrap_or_default().max(Q16::ZERO);
+        let off = state.watch.contact == Contact::Wall && ahead > Q16::ZERO;
+        // Too far for an edge, on a step that is not as high as the table has it.
+        let beyond = ahead > self.corner().first_contact(Direction::Deploy);
+        let ahead = if beyond { Q16::ZERO } else { ahead };
+        let floor = if off {
+            Q16::ZERO
+        } else if beyond {
+            seen.compression
+        } else {
+            self.watch.floor(&state.watch, state.direction, &seen)
+        };
+        // Half of a patch hangs over an edge that is nearer.
+        let reach = self.corner().first_contact(state.direction);
+        let far = self.distance(state).is_none_or(|distance| distance > reach);
+        Pulled {
+            pressed: tick.pressed,
+            load: tick.load,
+            depth: seen.compression,
+            ahead,
+            floor,
+            level: far && self.watch.is_level(&state.watch, state.direction, &seen),
+        }
     }
 
     /// Where the step is, from the moment at which its corner carries.
@@ -129,6 +170,10 @@ impl Estimator {
             }
             Expectation::Missing => {
                 found.limit(Limit::StepMissing);
+                if state.extra > 0 {
+                    // Or is it the one that the table lacks, and the wheel elsewhere?
+                    state.odometry.slip(Q16::ZERO, self.steps.tolerance());
+                }
                 state.missed_in_a_row = state.missed_in_a_row.saturating_add(1);
                 state.missed = match state.direction {
                     Direction::Deploy => state.missed.saturating_add(1),
@@ -186,7 +231,8 @@ impl Estimator {
             state.on_corner()
         };
         if begin || on_edge {
-            self.tread.begin(&mut state.tread, sensed.travel, preload, compression);
+            let (travel, _) = state.turns(sensed);
+            self.tread.begin(&mut state.tread, travel, preload, compression);
             return false;
         }
         self.tread.rest(&mut state.tread, preload, arm_thrust, compression)
@@ -263,7 +309,8 @@ impl Estimator {
         } + seen.compression;
         let lag = (sensed.speed.value * FILTER_LAG).widen();
         let travel = sensed.travel.saturating_sub(lag);
-        let at = OnEdge { travel, position, fall, depth: seen.compression };
+        let gave = state.odometry.gave();
+        let at = OnEdge { travel, position, fall, depth: seen.compression, gave };
         let on_floor = state.watch.contact == Contact::Both;
         // Of a crossing that began in its middle the wall below was not measured.
         let told = |open: &&mut OpenCrossing| !open.turned && ahead.abs() > self.telling;
@@ -349,6 +396,7 @@ impl Estimator {
             near: to_window.is_some_and(|ahead| ahead <= Q16::ZERO) && !state.known.is_searching(),
             over: self.is_over(state),
             clear: self.clear_of(state, sensed),
+            short: self.pulls.short(&state.wind_up),
         }
     }
 

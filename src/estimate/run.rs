@@ -4,7 +4,7 @@ use super::crossing::Contact;
 use super::{EstimateState, Estimator, Findings, OpenCrossing, Position, PositionConfidence};
 use crate::fault::Fault;
 use crate::sense::SensedState;
-use crate::units::{Direction, Millimetres, Q16, Ratio, Tick, q16};
+use crate::units::{Direction, Millimetres, Newtons, Q16, Ratio, Tick, q16};
 
 /// Off a whole number of steps by no more than this, the arm shows a level: half the
 /// hysteresis of a corner, and the tolerances of sleeve and arm.
@@ -23,12 +23,16 @@ impl Estimator {
         sensed: &SensedState,
         now: Tick,
         direction: Direction,
+        load: Newtons,
     ) -> (Findings, bool) {
         let mut found = Findings { advanced: true, replan: true, ..Findings::default() };
         let turned = state.direction != direction;
         state.direction = direction;
         state.leaving = None;
         state.odometry.begin_run(state.position);
+        if state.crossing.is_none() {
+            self.pulls.rest(&mut state.wind_up, load);
+        }
         if let Some(open) = state.crossing.as_mut() {
             open.slip.begin_run();
             open.hopeless_since = None;
@@ -140,8 +144,6 @@ impl Estimator {
             Direction::Deploy => (self.steps.count() + state.extra).saturating_sub(state.missed),
             Direction::Retract => 0,
         };
-        // Displaced, or is it the wheel: by a slip that was larger than it seemed?
-        let lost = state.displaced.is_some() && state.odometry.has_slipped();
         let on_wall = matches!(state.watch.contact, Contact::Wall | Contact::Leaving);
         // Steps that are not as high as the table has them add up.
         let off = (sensed.steps_up - Q16::from_num(expected)).abs() * self.steps.height();
@@ -149,7 +151,7 @@ impl Estimator {
             sensed.level == expected || off <= self.steps.height().half() + state.raised.abs();
         if !on_wall || !level || state.known.is_searching() {
             Err(Fault::LevelMismatch)
-        } else if state.known.is_unsure() || lost || self.sigma(state) > PLACE_WITHIN {
+        } else if state.known.is_unsure() || self.sigma(state) > PLACE_WITHIN {
             Err(Fault::PlaceUnconfirmed)
         } else {
             Ok(())

@@ -5,11 +5,13 @@ use super::crossing_speed::CrossingSpeed;
 use super::landing::{Landing, Slide};
 use super::odometry::Odometry;
 use super::tread::{Shown, TreadState};
+use super::wind_up::WindUp;
 use super::{CornerSlip, Place, Position, PositionConfidence};
 use crate::fault::{Fault, Limit};
 use crate::model::LimitedBy;
 use crate::model::history::{History, HistoryWriter};
 use crate::numeric::LowPassState;
+use crate::sense::SensedState;
 use crate::units::{
     Direction, Millimetres, MillimetresPerSecond, Newtons, Q16, Ratio, Tick, Travel, q16,
 };
@@ -25,6 +27,7 @@ pub struct EstimateState {
     pub position: Millimetres,
     pub(super) odometry: Odometry,
     pub(super) known: Position,
+    pub(super) wind_up: WindUp,
     /// Crossing watch.
     pub watch: WatchState,
     pub(super) tread: TreadState,
@@ -187,6 +190,28 @@ impl EstimateState {
     /// Preload behind the memory of the tread, N: what the tread has had time to take up.
     pub fn remembered_preload(&self) -> Newtons {
         self.remembered.output()
+    }
+
+    /// Travel that the drive is asked for, mm.
+    pub fn driven(&self, sensed: &SensedState) -> Travel {
+        sensed.travel.saturating_add(self.wind_up.lags())
+    }
+
+    /// Travel and speed of the wheel, mm and mm/s.
+    pub(super) fn turns(&self, sensed: &SensedState) -> (Travel, MillimetresPerSecond) {
+        let wind_up = &self.wind_up;
+        (sensed.travel.saturating_add(wind_up.gave()), sensed.speed.value + wind_up.speed())
+    }
+
+    /// The drive is off.
+    pub fn stand(&mut self, sensed: &SensedState) {
+        self.wind_up.stand(sensed.travel);
+    }
+
+    /// Takes off travel and speed of the wheel what moves no axle.
+    pub fn rim(&self, sensed: &mut SensedState) {
+        sensed.travel = sensed.travel.saturating_sub(self.wind_up.gave());
+        sensed.speed.value -= self.wind_up.speed();
     }
 
     /// Begins a tick at this travel of the wheel.

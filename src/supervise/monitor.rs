@@ -12,7 +12,7 @@ use crate::rig::{OVERPRESSURE_PART, Rig, RigError};
 use crate::sense::raw::BridgeCodes;
 use crate::sense::{Reason, SensedState, Validity};
 use crate::units::{
-    Duty, Millimetres, MillimetresPerSecond, Newtons, Q16, Ratio, TICK_HZ, Tick, q16,
+    Duty, Millimetres, MillimetresPerSecond, Newtons, Q16, Ratio, TICK_HZ, Tick, Travel, q16,
 };
 
 /// Ticks that overpressure must last, longer than noise.
@@ -65,6 +65,8 @@ pub struct Observed<'a> {
     pub mode: Mode,
     /// Sensors.
     pub sensed: &'a SensedState,
+    /// Travel of the wheel.
+    pub travel: Travel,
     /// Readback of the bridges since the last tick.
     pub bridges: Option<BridgeCodes>,
     /// Speed reference, signed, mm/s.
@@ -161,7 +163,7 @@ impl Monitor {
         let compared = Compared {
             now: seen.now,
             read_at: sensed.speed.at,
-            travel: sensed.travel,
+            travel: seen.travel,
             radius: sensed.radius.value,
             preload: sensed.preload.value,
             preload_due: seen.preload_due,

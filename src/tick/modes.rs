@@ -53,8 +53,9 @@ impl Controller {
     }
 
     fn begin_run(&self, state: &mut State, tick: &mut TickContext<'_>, direction: Direction) {
+        let load = self.load_of(state);
         let (found, on_corner) =
-            self.estimator.begin_run(&mut state.estimate, tick.sensed, tick.now, direction);
+            self.estimator.begin_run(&mut state.estimate, tick.sensed, tick.now, direction, load);
         if on_corner {
             // The drive has been off: without the corner's full feed-forward the wheel would roll
             // off before the speed loop reacts.

@@ -145,7 +145,7 @@ fn heights_off_the_table_do_not_hide_a_gap() {
 #[test]
 fn the_first_drop_of_a_thick_tread_teaches_the_second() {
     let summary =
-        ran(&["mismatch.tread_thickness_mm=10", "mismatch.tread_tau=2"], Direction::Retract);
+        ran(&["mismatch.tread_thickness=1.25", "mismatch.tread_tau=2"], Direction::Retract);
     let parts: Vec<f64> = summary.crossings.iter().map(|c| c.gap_mm / summary.gap_ref_mm).collect();
     assert!(parts.len() == 3 && parts[1..].iter().all(|part| *part <= 1.06), "{parts:?}");
 }

@@ -16,8 +16,8 @@ fn deployed(sets: &[&str]) -> (Recording, f64) {
 #[test]
 fn on_a_thick_tread_the_gap_holds_and_is_measured() {
     for thickness in ["5", "8", "12"] {
-        let set = format!("mismatch.tread_thickness_mm={thickness}");
-        let (recording, reference) = deployed(&[&set]);
+        let set = format!("tread.thickness_mm={thickness}");
+        let (recording, reference) = deployed(&[&set, "mismatch.tread_thickness=1"]);
         let crossings = &recording.summary.crossings;
         assert_eq!(crossings.len(), 3);
         for line in crossings {

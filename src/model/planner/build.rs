@@ -7,6 +7,7 @@ use crate::model::profile::Profile;
 use crate::model::rollout::{Run, roll};
 use crate::model::timing::{SLEW_PART, Timing};
 use crate::model::tread::{Axial, Tread, TreadState};
+use crate::model::wind_up::Shear;
 use crate::numeric::{checked, divide};
 use crate::rig::{CROSSOVER_RAD_S, MAX_STEPS, PROPORTIONAL, Rig, RigError};
 use crate::units::{Direction, Millimetres, MillimetresPerSecond, Newtons, Q16, Ratio, q16};
@@ -67,6 +68,7 @@ impl Planner {
         let answers = 1.0 + PROPORTIONAL;
         Ok(Self {
             tread,
+            shear: Shear::try_build(rig)?,
             profile: Profile::try_build(rig)?,
             timing: Timing::try_build(rig)?,
             drive: DriveModel {
