@@ -168,7 +168,7 @@ impl Controller {
         let acceleration = state.acceleration();
         let mut sensed =
             self.senses.step(&mut state.senses, input.now, &input.sensors, acceleration);
-        state.estimate.rim(&mut sensed);
+        state.estimate.rim(&mut sensed, matches!(state.mode, Mode::Run(..)));
         self.estimator.begin_tick(&mut state.estimate, &sensed);
         let arm_thrust = self.arm_coupling * self.load_of(state) * sensed.tan_arm;
         let tick =
@@ -231,12 +231,8 @@ impl Controller {
         }
     }
 
-    /// Follows steps and corners while the drive moves.
+    /// Follows steps and corners while the drive moves, and an axle that sinks on its tread.
     fn follow_contact(&self, state: &mut State, tick: &mut TickContext<'_>) {
-        if !state.mode.moves() {
-            state.estimate.stand(tick.sensed);
-            return;
-        }
         let plan = state.planning.plan.as_ref();
         let most = plan.map_or(Q16::MAX, |plan| plan.most_preload);
         let follow = Follow {
@@ -249,8 +245,12 @@ impl Controller {
             standing_since: state.approach.standing_since,
             limited_by: plan.map(|plan| plan.limited_by),
         };
-        let found = self.estimator.follow(&mut state.estimate, &follow);
-        self.take_findings(state, tick, found);
+        if state.mode.moves() {
+            let found = self.estimator.follow(&mut state.estimate, &follow);
+            self.take_findings(state, tick, found);
+        } else if state.mode != Mode::Service {
+            self.estimator.sink(&mut state.estimate, &follow);
+        }
     }
 }
 

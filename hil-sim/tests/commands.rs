@@ -7,7 +7,9 @@ use crate::common::{
 use hil_sim::scenario::{Direction, Scenario};
 use hil_sim::testing::long;
 use interstage::estimate::ContactStage as Stage;
+use hil_sim::plant::wall::touch_mm;
 use interstage::fault::Fault;
+use interstage::rig::Rig;
 use interstage::sense::raw::SensorId;
 use interstage::supervise::{Command, Leg, Mode, Trigger, next};
 use interstage::tick::Event;
@@ -104,6 +106,15 @@ fn stopped(case: &Case) -> Bench {
     bench
 }
 
+/// How far an axle may sink on a wheel that stands, mm: rubber that carries all of a corner's force at
+/// its stiffness at once, and then relaxes.
+fn sinks_mm(scenario: &Scenario) -> f64 {
+    let Rig { rig, preload, plant, tread, .. } = &scenario.rig;
+    let sine = touch_mm(rig.wheel_radius_mm, rig.step_height_mm) / rig.wheel_radius_mm;
+    let force_n = preload.limit_n * sine + plant.top_load_n * plant.top_load_share;
+    force_n / scenario.rig.shear().n_per_mm * (1.0 - 1.0 / tread.stiffening)
+}
+
 #[test]
 fn a_stop_brings_the_drive_to_rest_and_keeps_the_preload() {
     check_each(sample(everywhere()), |case| {
@@ -112,20 +123,26 @@ fn a_stop_brings_the_drive_to_rest_and_keeps_the_preload() {
         bench.give(Command::Stop);
         assert!(matches!(bench.mode(), Mode::Stopping(_)), "{name}");
         let after = |what: &str| format!("{what} after {name}");
-        bench.until(&after("rest"), 0.3, |now| now.truth.speed_mm_s.abs() < 0.5);
+        bench.until(&after("rest"), 0.3, |now| now.truth.rigid_mm_s.abs() < 0.5);
         bench.until(&after("idle"), 0.1, |now| now.seen.mode == Mode::Idle);
         // The worm brakes the remaining speed.
         bench.until(&after("standstill"), 0.025, Moment::is_still);
-        let (at, pressed) = (bench.position_mm(), bench.now().truth.preload_n);
-        let from = bench.moments.len();
+        let (from, sinks_mm) = (bench.now().clone(), sinks_mm(&case.scenario));
+        let moments = bench.moments.len();
         bench.run_s(1.0);
-        for now in &bench.moments[from..] {
+        for now in &bench.moments[moments..] {
             assert!(now.is_off() && now.is_still(), "{name}");
-            assert_eq!(now.truth.position_mm, at, "{name}");
-            // The tread relaxes into the wall and takes some spring with it.
-            let kept = now.truth.preload_n / pressed;
-            assert!((0.985..1.001).contains(&kept), "{name}: {kept}");
+            let sunk = from.truth.position_mm - now.truth.position_mm;
+            assert!((-0.05..sinks_mm).contains(&sunk), "{name}: {sunk}");
+            // The tread relaxes into the wall, or sinks down the corner, and takes some spring with it.
+            let kept = now.truth.preload_n / from.truth.preload_n;
+            assert!((0.98..1.001).contains(&kept), "{name}: {kept}");
         }
+        let off = |now: &Moment| now.seen.position.to_num::<f64>() - now.truth.position_mm;
+        let lost = off(bench.now()) - off(&from);
+        // Off a corner the controller knows by how much; on it the edge shows the place when it goes on.
+        let on_wall = matches!(case.place, Place::Cruise | Place::Settle);
+        assert!(!on_wall || lost.abs() < 0.3, "{name}: {lost}");
         assert_eq!(bench.mode(), Mode::Idle, "{name}");
         assert!(bench.faults().is_empty(), "{name}");
     });

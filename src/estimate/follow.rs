@@ -69,9 +69,7 @@ impl Estimator {
         };
         state.odometry.roll(tick.sensed.travel, &rolling, event.is_some());
         state.begin_tick(tick.sensed.travel);
-        let pulled = self.pulled(state, tick);
-        let (wind_up, odometry) = (&mut state.wind_up, &mut state.odometry);
-        self.pulls.step(wind_up, odometry, tick.sensed.travel, &pulled);
+        self.sink(state, tick);
         if let Some(open) = state.crossing.as_mut() {
             open.peak_preload = open.peak_preload.max(tick.sensed.preload_filtered);
         }
@@ -100,6 +98,16 @@ impl Estimator {
             found.shown = self.tread.roll(&mut state.tread, &rolls);
         }
         found
+    }
+
+    /// The tread gives way to what pulls at it, once a run has shown that; beside a wheel that stands
+    /// the axle sinks.
+    pub fn sink(&self, state: &mut EstimateState, tick: &Follow<'_>) {
+        if state.wind_up.is_known() {
+            let pulled = self.pulled(state, tick);
+            let (wind_up, odometry) = (&mut state.wind_up, &mut state.odometry);
+            self.pulls.step(wind_up, odometry, tick.sensed.travel, &pulled);
+        }
     }
 
     /// What pulls at the tread, and where.

@@ -30,9 +30,7 @@ impl Estimator {
         state.direction = direction;
         state.leaving = None;
         state.odometry.begin_run(state.position);
-        if state.crossing.is_none() {
-            self.pulls.rest(&mut state.wind_up, load);
-        }
+        self.pulls.begin(&mut state.wind_up, sensed.travel, load);
         if let Some(open) = state.crossing.as_mut() {
             open.slip.begin_run();
             open.hopeless_since = None;

@@ -198,18 +198,14 @@ impl EstimateState {
     }
 
     /// Travel and speed of the wheel, mm and mm/s.
-    pub(super) fn turns(&self, sensed: &SensedState) -> (Travel, MillimetresPerSecond) {
+    pub fn turns(&self, sensed: &SensedState) -> (Travel, MillimetresPerSecond) {
         let wind_up = &self.wind_up;
         (sensed.travel.saturating_add(wind_up.gave()), sensed.speed.value + wind_up.speed())
     }
 
-    /// The drive is off.
-    pub fn stand(&mut self, sensed: &SensedState) {
-        self.wind_up.stand(sensed.travel);
-    }
-
-    /// Takes off travel and speed of the wheel what moves no axle.
-    pub fn rim(&self, sensed: &mut SensedState) {
+    /// Takes off travel and speed of the wheel what moves no axle. A drive that `runs` makes up for it.
+    pub fn rim(&mut self, sensed: &mut SensedState, runs: bool) {
+        self.wind_up.follow(runs);
         sensed.travel = sensed.travel.saturating_sub(self.wind_up.gave());
         sensed.speed.value -= self.wind_up.speed();
     }

@@ -65,16 +65,11 @@ impl Pulls {
         state.winding.floor * self.shear.short()
     }
 
-    /// A run begins, on a wall: the tread has relaxed under its load.
-    pub(super) fn rest(&self, state: &mut WindUp, load: Newtons) {
-        let relaxed = self.shear.rest(load);
-        if core::mem::replace(&mut state.known, true) {
-            let gave = relaxed.displaced() - state.winding.displaced();
-            state.spread.gave += gave.widen();
+    /// The first run begins at this travel: the tread has relaxed under its load.
+    pub(super) fn begin(&self, state: &mut WindUp, travel: Travel, load: Newtons) {
+        if !core::mem::replace(&mut state.known, true) {
+            (state.winding, state.from) = (self.shear.rest(load), travel);
         }
-        let floor = state.winding.floor;
-        state.winding = relaxed;
-        state.winding.floor = floor;
     }
 
     /// A tick at this travel of the tread, less what it gave way by.
@@ -95,7 +90,7 @@ impl Pulls {
         let from = core::mem::replace(&mut state.from, travel);
         let sinks = pulled.floor - state.winding.floor;
         let presses = (pulled.floor + sinks * self.shear.stiffens()).max(Q16::ZERO);
-        let to_load = sqrt(presses) * presses;
+        let to_load = sqrt(pulled.floor) * presses;
         if pulled.level {
             state.carries = divide(pulled.pressed, to_load.max(LEAST * LEAST));
         }
@@ -139,10 +134,14 @@ impl Pulls {
 }
 
 impl WindUp {
-    /// The wheel stands at this travel, less what the tread gave way by.
-    pub(super) fn stand(&mut self, travel: Travel) {
-        (self.spread.gives, self.ticks) = (Travel::ZERO, 0);
-        self.from = travel.saturating_add(self.spread.gave);
+    /// Whether the drive makes up for what the tread gives way by.
+    pub(super) fn follow(&mut self, follows: bool) {
+        self.spread.stops = !follows;
+    }
+
+    /// Whether a run has shown what the tread carries.
+    pub(super) const fn is_known(&self) -> bool {
+        self.known
     }
 
     /// Travel of the tread that moved no axle, outwards.

@@ -74,6 +74,8 @@ pub struct Spread {
     held: Travel,
     /// What is not in `gave` yet.
     pub owes: Travel,
+    /// The drive makes up for no more of it.
+    pub stops: bool,
 }
 
 impl Shear {
@@ -163,7 +165,8 @@ impl Spread {
         let gives = self.owes >> SMOOTH;
         self.owes -= gives;
         self.gave = self.gave.saturating_add(gives);
-        self.gives += (gives - self.gives) >> SMOOTHER;
+        let (asked, smooth) = if self.stops { (Travel::ZERO, SMOOTH) } else { (gives, SMOOTHER) };
+        self.gives += (asked - self.gives) >> smooth;
         self.held = self.held.saturating_add(self.gives);
     }
 

@@ -249,6 +249,7 @@ impl VirtualRig {
             Moves::Driven(grip) | Moves::Free(grip) => grip.creeps(tread, speed, traction_n),
             Moves::Latched | Moves::Spins(_) => tread - speed,
         };
+        truth.rigid_mm_s = tread - creep;
         truth.friction_work_mj += truth.utilisation.abs() * normal * (creep.abs() * dt_s);
         truth.work_mj += (stride.motor_force_n(tread_load_n) * rolled).max(0.0);
         self.wind_up = stride.winding.end(traction_n);
