@@ -57,7 +57,7 @@ impl Estimator {
     pub fn follow(&self, state: &mut EstimateState, tick: &Follow<'_>) -> Findings {
         let mut found = Findings::default();
         let direction = state.direction;
-        state.history.step(self.stride, direction, tick.sensed.travel, tick.pressed);
+        state.history.step(self.stride, direction, state.turns(tick.sensed).0, tick.pressed);
         self.watch_slip(state, tick, &mut found);
         let seen = self.watch_input(state, tick.sensed);
         let event = self.watch.step(&mut state.watch, direction, &seen);

@@ -24,7 +24,7 @@ const SMOOTHER: u32 = 6;
 pub const CONTACT: Ratio = q16(800_000);
 
 /// Rubber between rim and hub. The default is a place to read one into.
-#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Shear {
     /// Displacement of the relaxed tread per traction, mm/N.
     compliance: Q16,

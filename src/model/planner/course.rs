@@ -107,6 +107,7 @@ impl Planner {
             axial: Axial::Driven(scene.load),
             pressed: Q16::ZERO,
             duration: Q16::ZERO,
+            gives: Q16::ZERO,
             scale: scene.scale,
             level: false,
         };
@@ -157,12 +158,11 @@ impl Planner {
         let (mut here, mut speed) = (from, Q16::ZERO);
         // The tread gives way against its load; the drive makes up for it later.
         let (mut winding, mut spread) = (self.shear.rest(scene.load), Spread::default());
-        let mut gives = Q16::ZERO;
         for stride in 0..MOST_STRIDES {
             if stride % STRIDES_AT_ONCE == 0 {
                 pause().await;
             }
-            left += self.tread.stride() + gives;
+            left += self.tread.stride();
             let mut ticks = 0;
             // Up to where it goes on the tread rolls in.
             if distance > steady {
@@ -194,11 +194,11 @@ impl Planner {
             overshot = over;
             drive.pressed = preload(ticks_in_all, follower.felt) + scene.arm_thrust;
             let contact = self.tread.advance(state, &drive);
-            let stride = (self.tread.stride(), drive.duration);
-            gives = sense * self.shear.follow(&mut winding, &contact, stride);
-            spread.owes += (sense * gives).widen();
             let now = along(contact.position);
-            per_tread = divide(here - now, self.tread.stride());
+            per_tread = divide(here - now, self.tread.stride() - drive.gives);
+            let stride = (self.tread.stride(), drive.duration);
+            drive.gives = sense * self.shear.follow(&mut winding, &contact, stride);
+            spread.owes += (sense * drive.gives).widen();
             here = now;
             // The stride's remainder lies ahead.
             distance = now - left;

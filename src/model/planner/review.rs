@@ -64,6 +64,7 @@ impl Planner {
             axial: Axial::Driven(load),
             pressed: first.pressed(),
             duration: Q16::ZERO,
+            gives: Q16::ZERO,
             scale,
             level: false,
         };
@@ -71,10 +72,14 @@ impl Planner {
         let before = if review.direction == Direction::Deploy { -before } else { before };
         self.tread.put_down(state, from + before, &drive);
         let mut lift_off = LiftOff::default();
+        let mut winding = self.shear.rest(load);
+        let sense = Q16::from_num(review.direction.sign());
         let mut roll = |state: &mut TreadState, stride: HistoryStride| {
             drive.pressed = stride.pressed();
             drive.duration = ticks_to_seconds(stride.ticks());
             let contact = self.tread.advance(state, &drive);
+            let stride = (self.tread.stride(), drive.duration);
+            drive.gives = sense * self.shear.follow(&mut winding, &contact, stride);
             lift_off.follow(&self.tread, review.direction, &contact);
             lift_off.is_found()
         };
