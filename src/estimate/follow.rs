@@ -125,11 +125,14 @@ impl Estimator {
         let ahead = ahead.unwrap_or_default().max(Q16::ZERO);
         let off = state.watch.contact == Contact::Wall && ahead > Q16::ZERO;
         // Too far for an edge, on a step that is not as high as the table has it.
-        let beyond = ahead > self.corner().first_contact(Direction::Deploy);
-        let ahead = if beyond { Q16::ZERO } else { ahead };
+        let on_corner = matches!(state.watch.contact, Contact::Both | Contact::Corner);
+        let most = self.corner().first_contact(Direction::Deploy);
+        let beyond = ahead > most && !on_corner;
+        let ahead = if beyond { Q16::ZERO } else { ahead.min(most) };
+        let over = state.watch.contact == Contact::Leaving && ahead == Q16::ZERO;
         let floor = if off {
             Q16::ZERO
-        } else if beyond {
+        } else if beyond || over {
             seen.compression
         } else {
             self.watch.floor(&state.watch, state.direction, &seen)

@@ -30,7 +30,8 @@ impl Estimator {
         state.direction = direction;
         state.leaving = None;
         state.odometry.begin_run(state.position);
-        self.pulls.begin(&mut state.wind_up, sensed.travel, load);
+        let carries = self.tread.means(Millimetres::ONE);
+        self.pulls.begin(&mut state.wind_up, sensed.travel, load, carries);
         if let Some(open) = state.crossing.as_mut() {
             open.slip.begin_run();
             open.hopeless_since = None;

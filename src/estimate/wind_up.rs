@@ -65,10 +65,12 @@ impl Pulls {
         state.winding.floor * self.shear.short()
     }
 
-    /// The first run begins at this travel: the tread has relaxed under its load.
-    pub(super) fn begin(&self, state: &mut WindUp, travel: Travel, load: Newtons) {
+    /// The first run begins at this travel: the tread has relaxed under its load, N; 1 mm of it
+    /// `carries` so much, N.
+    pub(super) fn begin(&self, state: &mut WindUp, travel: Travel, load: Newtons, carries: Newtons) {
         if !core::mem::replace(&mut state.known, true) {
             (state.winding, state.from) = (self.shear.rest(load), travel);
+            state.carries = carries;
         }
     }
 
@@ -88,7 +90,7 @@ impl Pulls {
         }
         state.ticks = 0;
         let from = core::mem::replace(&mut state.from, travel);
-        let sinks = pulled.floor - state.winding.floor;
+        let sinks = pulled.floor - state.winding.sunk;
         let presses = (pulled.floor + sinks * self.shear.stiffens()).max(Q16::ZERO);
         let to_load = sqrt(pulled.floor) * presses;
         if pulled.level {
@@ -103,6 +105,7 @@ impl Pulls {
             contact: self.contact(pulled, floor),
             rolled: Q16::narrow(travel.saturating_sub(from)).abs(),
             floor: pulled.floor,
+            patch: sqrt(pulled.floor * (self.radius + self.radius)),
             duration: ticks_to_seconds(PERIOD.into()),
         };
         let gives = odometry.give(self.shear.roll(&mut state.winding, &pull));

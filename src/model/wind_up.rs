@@ -48,8 +48,10 @@ pub struct Pull {
     pub contact: Millimetres,
     /// See `contact`.
     pub rolled: Millimetres,
-    /// Compression by the wall below an edge, mm.
+    /// Compression by the wall below an edge, and half the length of its contact, mm.
     pub floor: Millimetres,
+    /// See `floor`.
+    pub patch: Millimetres,
     /// Duration, s.
     pub duration: Seconds,
 }
@@ -59,8 +61,11 @@ pub struct Pull {
 pub struct Winding {
     displaced: Millimetres,
     memory: Millimetres,
-    /// What the tread remembers of its compression by the lower wall, mm.
+    /// What the tread remembers of its compression by the lower wall where it leaves that, and over
+    /// all of the patch, mm.
     pub floor: Millimetres,
+    /// See `floor`.
+    pub sunk: Millimetres,
 }
 
 /// What gives way, spread over so much time that a drive which makes up for it does not jolt.
@@ -124,6 +129,7 @@ impl Shear {
             contact: stride.0 * Q16::from_num(contact.visits.max(1)) * CONTACT,
             rolled: stride.0,
             floor: Q16::ZERO,
+            patch: Q16::ZERO,
             duration: stride.1,
         };
         let [creeps, winds] = self.roll(state, &pull);
@@ -147,7 +153,13 @@ impl Shear {
         let creeps = divide(pulls * renewed, self.relaxation_lengths * rolling * carter);
         let winds = displaced - state.displaced;
         let floor = follows * pull.floor + divide(state.floor, all);
-        *state = Winding { displaced, memory: follows * displaced + kept, floor };
+        // The half of a patch that sinks in leads its memory by about as much as the other half lags:
+        // what is left is of the second order in the travel of a relaxation over half the patch.
+        let passes = divide(pull.rolled, pull.patch.max(pull.rolled));
+        let renewed = passes * divide(passes, relaxes.max(Q16::DELTA)).min(Ratio::ONE);
+        let all = Ratio::ONE + relaxes + renewed;
+        let sunk = divide(relaxes * pull.floor + state.sunk, all);
+        *state = Winding { displaced, memory: follows * displaced + kept, floor, sunk };
         [creeps, winds]
     }
 }
