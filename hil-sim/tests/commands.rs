@@ -498,13 +498,3 @@ fn after_power_loss_an_end_is_not_claimed_before_it_is_reached() {
     }
     assert!(wrong.is_empty(), "complete, but away from the end: {wrong:?}");
 }
-
-#[test]
-fn zz_debug() {
-    let case = everywhere().find(|c| c.name == "fe deploy Approach and 40 ms").unwrap();
-    let mut bench = stopped(&case);
-    let n = bench.moments.len();
-    bench.go(case.scenario.run.direction);
-    for m in &bench.moments[n-700..] { let t=&m.seen; let x=&m.truth; if t.at % 10 == 0 || matches!(t.mode, Mode::FaultHold(_)) { println!("c {:.1} fl {:.1} u {:.3} {} {:?} {:?} pos {} true {:.3} v {} ref {} wheel {:.2} axle {:.2} duty {:?} P {:.1} {}", x.corner_n, x.floor_n, x.utilisation, t.at, t.mode, t.stage, t.position, x.position_mm, t.speed, t.speed_ref, x.tread_mm_s, x.speed_mm_s, m.drive.duty, x.preload_n, t.distance); } }
-    println!("{:?}", bench.faults());
-}

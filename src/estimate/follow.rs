@@ -324,8 +324,16 @@ impl Estimator {
         let at = OnEdge { travel, position, fall, depth: seen.compression, gave };
         let on_floor = state.watch.contact == Contact::Both;
         // Of a crossing that began in its middle the wall below was not measured.
-        let told = |open: &&mut OpenCrossing| !open.turned && ahead.abs() > self.telling;
-        let Some(open) = state.crossing.as_mut().filter(told) else { return };
+        let Some(open) = state.crossing.as_mut().filter(|open| !open.turned) else { return };
+        if ahead.abs() <= self.telling {
+            let lift = open.lift.filter(|_| open.corrected && open.slip.lost == Q16::ZERO);
+            let climbs = lift.filter(|_| state.direction == Direction::Deploy);
+            if let Some(lift) = climbs.filter(|_| !core::mem::replace(&mut open.climbed, true)) {
+                state.odometry.climb(state.position, position + ahead - lift.face);
+                state.begin_tick(sensed.travel);
+            }
+            return;
+        }
         let radius = self.watch.radius();
         let lost = match state.direction {
             Direction::Deploy => open.slip.step(radius, &at, on_floor),

@@ -24,6 +24,9 @@ const PER_REACH: Q16 = q16(15_625);
 const UNKNOWN_WINDING: Ratio = q16(1_333_000);
 /// The same of its creep, of the same compliance and of a contact that is 0.25 longer or shorter.
 const UNKNOWN_CREEP: Ratio = q16(4_080_000);
+/// Variance of how far an edge seems to move under a climbing wheel, over that of a step's place: 0.3 mm,
+/// of a sensor of the mean compression, and of rubber that is thicker than its elements.
+const EDGE: Ratio = q16(3_000_000);
 /// Largest correction of the travel, relative.
 const MOST_SCALE: Ratio = q16(20_000);
 /// The same of winding up and creep.
@@ -54,6 +57,8 @@ pub struct Odometry {
     /// Parts of the last residual that the position took over, and each of them.
     share: Ratio,
     gains: [Ratio; STATES],
+    /// How the states shifted the position where a step last corrected it.
+    mark: [Ratio; STATES],
     from: Option<Start>,
 }
 
@@ -73,6 +78,7 @@ impl Default for Odometry {
             covariance,
             share: Ratio::ZERO,
             gains: [Ratio::ZERO; STATES],
+            mark: [Ratio::ONE, Ratio::ZERO, Ratio::ZERO, Ratio::ZERO],
             from: None,
         }
     }
@@ -94,6 +100,10 @@ pub struct Rolling {
 struct Start {
     travel: Travel,
     radius: Millimetres,
+}
+
+fn sum(parts: &[Ratio; STATES], weights: &[Ratio; STATES]) -> Ratio {
+    parts.iter().zip(weights).fold(Q16::ZERO, |sum, (part, weight)| sum + *part * *weight)
 }
 
 /// A covariance of these variances.
@@ -137,7 +147,7 @@ impl Odometry {
     }
 
     fn variance(&self, position: Millimetres) -> Ratio {
-        self.expect(position).1
+        self.expect(&self.weights(position)).1
     }
 
     /// How the states shift the position.
@@ -146,14 +156,22 @@ impl Odometry {
         [Ratio::ONE, (position - self.origin) * PER_REACH, crept, wound]
     }
 
-    /// Covariance of the states with the position, and its variance.
-    fn expect(&self, position: Millimetres) -> ([Ratio; STATES], Ratio) {
-        let weights = self.weights(position);
-        let sum = |row: &[Ratio; STATES]| {
-            row.iter().zip(weights).fold(Q16::ZERO, |sum, (part, weight)| sum + *part * weight)
-        };
-        let with = self.covariance.each_ref().map(sum);
-        (with, sum(&with))
+    /// Covariance of the states with their sum by these weights, and its variance.
+    fn expect(&self, weights: &[Ratio; STATES]) -> ([Ratio; STATES], Ratio) {
+        let with = self.covariance.each_ref().map(|row| sum(row, weights));
+        (with, sum(&with, weights))
+    }
+
+    /// The gains of a residual with these weights, whose variance is `noise`.
+    fn learn(&mut self, weights: &[Ratio; STATES], noise: Ratio) -> [Ratio; STATES] {
+        let (with, expected) = self.expect(weights);
+        let gains = with.map(|part| divide(part, noise + expected));
+        for (row, gain) in self.covariance.iter_mut().zip(gains) {
+            for (part, other) in row.iter_mut().zip(with) {
+                *part -= gain * other;
+            }
+        }
+        gains
     }
 
     /// What the tread gave way by since the origin, by its model, mm.
@@ -180,25 +198,31 @@ impl Odometry {
     /// where the table has it, mm; what is left of it.
     pub fn correct(&mut self, position: Millimetres, residual: Millimetres) -> Millimetres {
         self.covariance[0][0] += WANDERS;
-        let (with, expected) = self.expect(position);
-        let all = Ratio::ONE + expected;
-        self.gains = with.map(|part| divide(part, all));
-        for (row, gain) in self.covariance.iter_mut().zip(self.gains) {
-            for (part, other) in row.iter_mut().zip(with) {
-                *part -= gain * other;
-            }
-        }
-        let by = self.weights(position);
-        self.share = self.gains.iter().zip(by).fold(Q16::ZERO, |all, (gain, by)| all + *gain * by);
+        self.mark = self.weights(position);
+        self.gains = self.learn(&self.mark.clone(), Ratio::ONE);
+        self.share = sum(&self.gains, &self.mark);
         self.refine(residual)
+    }
+
+    /// The edge that last corrected the position seems to have moved outwards by so much, mm, while the
+    /// wheel climbed to `position`: so far the tread gave way by more than its model has it.
+    pub fn climb(&mut self, position: Millimetres, moved: Millimetres) {
+        let weights = self.weights(position);
+        let since = core::array::from_fn(|i| weights[i] - self.mark[i]);
+        let gains = self.learn(&since, EDGE);
+        self.take(moved, sum(&gains, &weights), gains);
     }
 
     /// The step found last lies `shift` further out than its residual had it, mm; what is left of
     /// that.
     pub fn refine(&mut self, shift: Millimetres) -> Millimetres {
-        let taken = shift * self.share;
+        self.take(shift, self.share, self.gains)
+    }
+
+    fn take(&mut self, shift: Millimetres, share: Ratio, gains: [Ratio; STATES]) -> Millimetres {
+        let taken = shift * share;
         self.offset = self.offset.saturating_sub(taken.widen());
-        let [_, scale, more @ ..] = self.gains;
+        let [_, scale, more @ ..] = gains;
         let scale = self.scale - shift * scale * PER_REACH;
         self.scale = scale.clamp(-MOST_SCALE, MOST_SCALE);
         for (part, gain) in self.more.iter_mut().zip(more) {

@@ -77,6 +77,8 @@ pub struct OpenCrossing {
     pub reported: bool,
     /// Its step has corrected the position.
     pub corrected: bool,
+    /// What the edge showed while the wheel climbed has corrected it, too.
+    pub climbed: bool,
     /// When the corner was first detected.
     pub touched_at: Tick,
     /// Position of the face by the corner that carries, as soon as it shows, mm.
