@@ -3,6 +3,7 @@
 use super::landing::Landing;
 use super::{EstimateState, Estimator, Findings, OpenCrossing, Position, Slip};
 use crate::fault::{Fault, Limit};
+use crate::numeric::sqrt;
 use crate::sense::SensedState;
 use crate::units::{Direction, Millimetres, Q16, q16};
 
@@ -11,10 +12,11 @@ use crate::units::{Direction, Millimetres, Q16, q16};
 const HEIGHT_SEEN: Millimetres = q16(120_000);
 
 impl Estimator {
-    /// Largest residual of a step that is where the table has it, mm: its tolerance, and three
-    /// sigma of the position.
+    /// Largest residual of a step that is where the table has it, mm: its tolerance and three sigma of
+    /// the position, which are independent.
     pub(super) fn tolerated(&self, state: &EstimateState) -> Millimetres {
-        self.steps.tolerance() + self.sigma(state) * q16(3_000_000)
+        let (tolerance, off) = (self.steps.tolerance(), self.sigma(state) * q16(3_000_000));
+        sqrt(tolerance * tolerance + off * off)
     }
 
     /// Whether a step is off by no more than is tolerated, or by as much as the one before it.

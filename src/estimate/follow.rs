@@ -329,7 +329,13 @@ impl Estimator {
             let lift = open.lift.filter(|_| open.corrected && open.slip.lost == Q16::ZERO);
             let climbs = lift.filter(|_| state.direction == Direction::Deploy);
             if let Some(lift) = climbs.filter(|_| !core::mem::replace(&mut open.climbed, true)) {
-                state.odometry.climb(state.position, position + ahead - lift.face);
+                let moved = position + ahead - lift.face;
+                if open.searched {
+                    // The wheel may have begun on this corner, and lifted off elsewhere.
+                    state.odometry.set_by_step(sensed.travel, state.position - moved);
+                } else {
+                    state.odometry.climb(state.position, moved);
+                }
                 state.begin_tick(sensed.travel);
             }
             return;
@@ -376,6 +382,7 @@ impl Estimator {
             state.odometry.set_by_step(sensed.travel, state.position - residual);
             state.known = Position::Located;
             (residual, open.corrected) = (Q16::ZERO, true);
+            open.searched = true;
         } else if corrects && !retracts && self.is_explained(state, open.step, residual) {
             residual = self.correct(state, sensed, (open.step, residual), found);
             open.corrected = true;

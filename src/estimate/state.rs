@@ -77,6 +77,8 @@ pub struct OpenCrossing {
     pub reported: bool,
     /// Its step has corrected the position.
     pub corrected: bool,
+    /// It has found the position.
+    pub searched: bool,
     /// What the edge showed while the wheel climbed has corrected it, too.
     pub climbed: bool,
     /// When the corner was first detected.
