@@ -200,6 +200,7 @@ impl Controller {
             mode: state.mode,
             sensed: tick.sensed,
             travel: state.estimate.driven(tick.sensed),
+            wound: state.estimate.wound(),
             bridges: input.sensors.bridges,
             speed_ref: state.signed_speed(),
             preload_due: state.preload_loop.due(),

@@ -119,7 +119,9 @@ impl Estimator {
                 face.or(self.steps.face(open.step)).map(|face| face - state.position)
             }
             // A wheel that goes over an edge is on it before that shows.
-            None if state.direction == Direction::Retract => self.distance(state).map(|d| -d),
+            None if state.direction == Direction::Retract && !state.known.is_searching() => {
+                self.distance(state).map(|distance| -distance)
+            }
             None => None,
         };
         let ahead = ahead.unwrap_or_default().max(Q16::ZERO);

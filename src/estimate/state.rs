@@ -201,6 +201,11 @@ impl EstimateState {
         sensed.travel.saturating_add(self.wind_up.lags())
     }
 
+    /// How far the tread is wound up, mm.
+    pub fn wound(&self) -> Millimetres {
+        self.wind_up.displaced().abs()
+    }
+
     /// Travel and speed of the wheel, mm and mm/s.
     pub fn turns(&self, sensed: &SensedState) -> (Travel, MillimetresPerSecond) {
         let wind_up = &self.wind_up;

@@ -147,6 +147,11 @@ impl WindUp {
         self.known
     }
 
+    /// Displacement of the rim against the hub, mm.
+    pub(super) const fn displaced(&self) -> Millimetres {
+        self.winding.displaced()
+    }
+
     /// Travel of the tread that moved no axle, outwards.
     pub(super) const fn gave(&self) -> Travel {
         self.spread.gave

@@ -177,6 +177,8 @@ pub(super) struct Compared {
     pub(super) read_at: Tick,
     /// Travel by the encoder.
     pub(super) travel: Travel,
+    /// How far the tread is wound up, mm.
+    pub(super) wound: Millimetres,
     /// Wheel centre's distance from the pillar axis, mm.
     pub(super) radius: Millimetres,
     /// Preload, N.
@@ -313,7 +315,7 @@ impl CrossCheck {
     }
 }
 
-/// Whether the arm has moved farther than the wheel.
+/// Whether the arm has moved farther than the wheel, and the tread that lets go of its axle.
 fn arm_runs_ahead(state: &mut CrossState, seen: &Compared) -> bool {
     if state.arm_ticks == 0 {
         state.arm = (seen.radius, seen.travel);
@@ -322,7 +324,7 @@ fn arm_runs_ahead(state: &mut CrossState, seen: &Compared) -> bool {
     state.arm_ticks -= 1;
     let (radius, travel) = state.arm;
     let rolled = Q16::narrow(seen.travel.saturating_sub(travel)).abs();
-    (seen.radius - radius).abs() > rolled + ARM_BEYOND
+    (seen.radius - radius).abs() > rolled + seen.wound + ARM_BEYOND
 }
 
 /// Bounds of a sensor's codes.

@@ -67,6 +67,8 @@ pub struct Observed<'a> {
     pub sensed: &'a SensedState,
     /// Travel of the wheel.
     pub travel: Travel,
+    /// How far the tread is wound up, mm.
+    pub wound: Millimetres,
     /// Readback of the bridges since the last tick.
     pub bridges: Option<BridgeCodes>,
     /// Speed reference, signed, mm/s.
@@ -164,6 +166,7 @@ impl Monitor {
             now: seen.now,
             read_at: sensed.speed.at,
             travel: seen.travel,
+            wound: seen.wound,
             radius: sensed.radius.value,
             preload: sensed.preload.value,
             preload_due: seen.preload_due,

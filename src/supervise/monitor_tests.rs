@@ -14,6 +14,7 @@ fn sensed(speed: f64, preload: f64) -> SensedState {
         |value: f64| Reading { value: Q16::from_num(value), at: 0, validity: Validity::Valid };
     SensedState {
         travel: Travel::ZERO,
+        wound: Q16::ZERO,
         speed: reading(speed),
         preload: reading(preload),
         preload_filtered: Q16::from_num(preload),
@@ -57,6 +58,7 @@ fn observed(mode: Mode, sensed: &SensedState) -> Observed<'_> {
         mode,
         sensed,
         travel: sensed.travel,
+        wound: Q16::ZERO,
         bridges: Some(IDLE),
         speed_ref: Q16::ZERO,
         preload_due: Q16::ZERO,
