@@ -153,7 +153,9 @@ fn assert_arrived(bench: &Bench, scenario: &Scenario, direction: Direction, name
     let limit = scenario.rig.preload.limit_n;
     assert_eq!(bench.mode(), Mode::Complete(direction.into()), "{name}");
     let off = bench.position_mm() - end_mm(scenario, direction);
-    assert!(off.abs() < 0.5, "{name}: {off} mm from the end");
+    // At three times the load the tread gives way by three times as much.
+    let within = if scenario.preset == "fe" { 0.7 } else { 0.5 };
+    assert!(off.abs() < within, "{name}: {off} mm from the end");
     let level = if direction == Direction::Deploy { 3 } else { 0 };
     assert_eq!(bench.now().seen.level, level, "{name}");
     assert!(bench.step_codes().is_empty(), "{name}: {:?}", bench.step_codes());
@@ -228,7 +230,7 @@ fn assert_sound_records(bench: &Bench, scenario: &Scenario, name: &str) {
         let truth = bench.true_gap_mm(&record);
         // At the study's loads a wheel that is turned back on the corner just after touch-down
         // leaves the lower wall at 19 mm/s: 1.07.
-        let (most, off) = if name.starts_with("fe") { (1.08, 0.05) } else { (1.05, 0.03) };
+        let (most, off) = if name.starts_with("fe") { (1.08, 0.06) } else { (1.05, 0.03) };
         let part = truth.unwrap_or(measured) / gap_ref(scenario, record.direction);
         assert!((0.65..most).contains(&part), "{name}: {part} {record:?}");
         let error = measured / truth.unwrap_or(measured) - 1.0;

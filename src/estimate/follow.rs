@@ -253,6 +253,8 @@ impl Estimator {
     }
 
     fn touched(&self, state: &mut EstimateState, tick: &Follow<'_>, found: &mut Findings) {
+        // Behind a corner the effort is another one.
+        state.tread.rises = false;
         let distance = self.distance(state);
         let expectation = self.steps.expectation(state.direction, distance);
         let searching = state.known.is_searching() && state.next_step > 0;

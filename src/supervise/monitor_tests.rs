@@ -14,7 +14,6 @@ fn sensed(speed: f64, preload: f64) -> SensedState {
         |value: f64| Reading { value: Q16::from_num(value), at: 0, validity: Validity::Valid };
     SensedState {
         travel: Travel::ZERO,
-        wound: Q16::ZERO,
         speed: reading(speed),
         preload: reading(preload),
         preload_filtered: Q16::from_num(preload),

@@ -47,7 +47,7 @@ fn following_the_rotation_and_preload_of_a_run_gives_that_run() {
         }
         // The arm's modes vanish in the mean; what a step of time leaves grows with it.
         let mean: f64 = height / count;
-        assert!(mean.abs() < 1.2e-4 * step as f64, "{step}: {mean}");
+        assert!(mean.abs() < 1.5e-4 * step as f64, "{step}: {mean}");
     }
 }
 

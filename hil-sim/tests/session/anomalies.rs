@@ -111,7 +111,8 @@ fn assert_safe(got: &Outcome, scenario: &Scenario, part: f64, name: &str) {
 fn assert_found(got: &Outcome, name: &str) {
     for line in &got.summary.crossings {
         let off = line.step_found_mm.expect("reported") - line.step_mm;
-        assert!(off.abs() < 0.5, "{name}, step at {}: {off}", line.step_mm);
+        // Three sigma of a place that no step near it has confirmed.
+        assert!(off.abs() < 0.65, "{name}, step at {}: {off}", line.step_mm);
     }
 }
 
@@ -232,7 +233,7 @@ fn there_and_back(scenario: &Scenario) -> Bench {
         let unconfirmed = mode == Mode::FaultHold(Fault::PlaceUnconfirmed) && !confirmed;
         let arrived = mode == Mode::Complete(direction.into());
         assert!(arrived || unconfirmed, "{mode:?} {:?}", scenario.run);
-        if unconfirmed {
+        if unconfirmed && direction == scenario.run.direction {
             bench.give(Command::Reset);
             bench.until("idle", 1.0, |now| now.seen.mode == Mode::Idle);
         }
