@@ -217,7 +217,7 @@ impl Tread {
         if drive.level {
             return self.stride.to_bits() << 6;
         }
-        let rolled = self.stride - drive.gives;
+        let rolled = self.stride - between(drive.gives, -self.stride, self.stride);
         let slope = divide(Q16::from_bits(state.frame.climb >> 6), self.stride);
         let level = sqrt((Q16::ONE - slope * slope).max(Q16::ZERO));
         let wall = if state.frame.position >= 0 { self.height } else { 0 };
