@@ -183,10 +183,8 @@ impl Estimator {
             }
             Expectation::Missing => {
                 found.limit(Limit::StepMissing);
-                if state.extra > 0 {
-                    // Or is it the one that the table lacks, and the wheel elsewhere?
-                    state.odometry.slip(Q16::ZERO, self.steps.tolerance());
-                }
+                // Or is it there, and the wheel elsewhere?
+                state.odometry.slip(Q16::ZERO, self.steps.tolerance());
                 state.missed_in_a_row = state.missed_in_a_row.saturating_add(1);
                 state.missed = match state.direction {
                     Direction::Deploy => state.missed.saturating_add(1),

@@ -232,7 +232,7 @@ impl Tread {
     /// What the rays meet. A ray at the angle a meets the lower wall before the face for
     /// `y tan a < -x`, and the upper wall behind the corner for `(y - h) tan a > -x`.
     fn facets(&self, state: &Frame) -> Facets {
-        let to_face = -state.position;
+        let to_face = state.position.saturating_neg();
         let above = (state.centre - self.height).max(1);
         let first = |height: i32, from: i32| {
             let beyond = |place: &i32| {

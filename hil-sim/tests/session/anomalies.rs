@@ -36,8 +36,12 @@ impl Outcome {
 /// Whether a step lies behind this one on the way.
 fn is_confirmed(direction: Direction, anomaly: StepAnomaly) -> bool {
     let last = if direction == Direction::Deploy { 3 } else { 1 };
-    !matches!(anomaly, StepAnomaly::Early { step, .. } | StepAnomaly::Late { step, .. }
-        if step == last)
+    match anomaly {
+        StepAnomaly::Early { step, .. }
+        | StepAnomaly::Late { step, .. }
+        | StepAnomaly::Missing { step } => step != last,
+        _ => true,
+    }
 }
 
 fn outcome(scenario: &Scenario) -> Outcome {
