@@ -317,6 +317,13 @@ impl CrossingWatch {
         }
     }
 
+    /// Whether a retracting wheel may be over an edge by so much, mm: it sinks by `x^2 / 2 R`, or half of
+    /// that.
+    pub fn may_be_over(&self, state: &WatchState, seen: &WatchInput, over: Millimetres) -> bool {
+        let sunk = self.rise(state, Direction::Retract, seen) + TOUCH;
+        over * over < sunk * self.radius * q16(4_000_000)
+    }
+
     /// Whether the wheel is on a wall, far from any edge.
     pub fn is_level(&self, state: &WatchState, direction: Direction, seen: &WatchInput) -> bool {
         state.contact == Contact::Wall && self.rise(state, direction, seen).abs() < HOLD

@@ -120,7 +120,8 @@ impl Estimator {
             }
             // A wheel that goes over an edge is on it before that shows.
             None if state.direction == Direction::Retract && !state.known.is_searching() => {
-                self.distance(state).map(|distance| -distance)
+                let over = self.distance(state).map(|distance| -distance);
+                over.filter(|over| self.watch.may_be_over(&state.watch, &seen, *over))
             }
             None => None,
         };
