@@ -175,7 +175,7 @@ pub(super) struct Measured {
 
 /// Slip of a crossing so far, if any.
 pub(super) fn slip_of(open: &OpenCrossing, position: Millimetres) -> Option<Slip> {
-    let amount = open.slip.lost;
+    let amount = open.slip.lost + open.slip.beside;
     let sigma = open.landing.map_or(open.slip.sigma(), |landing| landing.sigma());
     (amount > Q16::ZERO).then_some(Slip { position, amount, sigma })
 }

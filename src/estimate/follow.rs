@@ -329,13 +329,17 @@ impl Estimator {
         // Of a crossing that began in its middle the wall below was not measured.
         let Some(open) = state.crossing.as_mut().filter(|open| !open.turned) else { return };
         if ahead.abs() <= self.telling {
-            let lift = open.lift.filter(|_| open.corrected && open.slip.lost == Q16::ZERO);
+            let lift = open.lift.filter(|_| open.corrected);
             let climbs = lift.filter(|_| state.direction == Direction::Deploy);
             if let Some(lift) = climbs.filter(|_| !core::mem::replace(&mut open.climbed, true)) {
                 let moved = position + ahead - lift.face;
                 if open.searched {
                     // The wheel may have begun on this corner, and lifted off elsewhere.
                     state.odometry.set_by_step(sensed.travel, state.position - moved);
+                } else if open.slip.lost > Q16::ZERO {
+                    // What the wheel slipped in all, its creep made up for.
+                    open.slip.beside = moved.max(-open.slip.lost);
+                    state.odometry.slip(moved, Q16::ZERO);
                 } else {
                     state.odometry.climb(state.position, moved);
                 }

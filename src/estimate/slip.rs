@@ -67,6 +67,8 @@ pub struct CornerSlip {
     noise: Millimetres,
     /// Slip so far, mm: travel of the tread that moved no axle, or of the axle that no tread made.
     pub lost: Millimetres,
+    /// What it is more by the place of the edge in the end, mm.
+    pub beside: Millimetres,
 }
 
 impl CornerSlip {
@@ -115,7 +117,8 @@ impl CornerSlip {
 
     /// A run begins: nothing is known of how wheel and axle moved since the last one.
     pub(super) fn begin_run(&mut self) {
-        *self = Self { lost: self.lost, noise: self.noise, ..Self::default() };
+        *self =
+            Self { lost: self.lost, beside: self.beside, noise: self.noise, ..Self::default() };
     }
 
     /// The wheel slips, or has not been seen to grip since.

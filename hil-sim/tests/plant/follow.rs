@@ -7,9 +7,9 @@ use hil_sim::session::{Options, RunningRig, Session};
 
 use super::bench::{TICK_S, nominal, steps};
 
-/// Bound on the position, mm, per millisecond of the step: a sixth of the travel. The
+/// Bound on the position, mm, per millisecond of the step: a quarter of the travel. The
 /// following wheel turns evenly within a step and pivots by the forces of the one before.
-const POSITION_MM: f64 = 0.005;
+const POSITION_MM: f64 = 0.0075;
 /// Bound on the height, mm: the ripple on the arm's modes, which a following rig does not have.
 const SHAKEN_MM: f64 = 0.002;
 

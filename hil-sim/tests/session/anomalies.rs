@@ -238,6 +238,7 @@ fn there_and_back(scenario: &Scenario) -> Bench {
         let arrived = mode == Mode::Complete(direction.into());
         assert!(arrived || unconfirmed, "{mode:?} {:?}", scenario.run);
         if unconfirmed && direction == scenario.run.direction {
+            bench.run_s(0.5);
             bench.give(Command::Reset);
             bench.until("idle", 1.0, |now| now.seen.mode == Mode::Idle);
         }
