@@ -122,7 +122,7 @@ impl Estimator {
                 }
                 if higher.abs() > HEIGHT_SEEN {
                     // The height moves the face, and is read on a wall that is not there.
-                    state.odometry.slip(Q16::ZERO, shift.half());
+                    state.odometry.slip(Q16::ZERO, shift);
                 }
                 point.face += left;
                 point.residual += left;
