@@ -336,9 +336,9 @@ impl Estimator {
                 if open.searched {
                     // The wheel may have begun on this corner, and lifted off elsewhere.
                     state.odometry.set_by_step(sensed.travel, state.position - moved);
-                } else if open.slip.lost > Q16::ZERO {
-                    // What the wheel slipped in all, its creep made up for.
-                    open.slip.beside = moved.max(-open.slip.lost);
+                } else if open.slip.lost > moved.abs() {
+                    // More slip than creep: what the wheel slipped in all.
+                    open.slip.beside = moved;
                     state.odometry.slip(moved, Q16::ZERO);
                 } else {
                     state.odometry.climb(state.position, moved);

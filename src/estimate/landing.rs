@@ -22,7 +22,7 @@ const SHOWN: Millimetres = q16(90_000);
 const SLID: Millimetres = q16(300_000);
 /// Part by which the tread may give way otherwise than by its model, one sigma: of rubber from 4 to
 /// 16 mm thick that is told as 8.
-const GIVES_OTHERWISE: Ratio = q16(600_000);
+pub(super) const GIVES_OTHERWISE: Ratio = q16(600_000);
 /// Distance by which the face has moved inwards once the wheel has landed, mm.
 const LANDED: Millimetres = q16(200_000);
 /// Part that the largest compression has in the slide; the rest has the compression as read. A tread

@@ -10,7 +10,7 @@
 #![deny(clippy::float_arithmetic)]
 
 use super::crossing::HEIGHT_MOST;
-use super::landing::OnEdge;
+use super::landing::{GIVES_OTHERWISE, OnEdge};
 use crate::numeric::{divide, sqrt};
 use crate::units::{Millimetres, Q16, Ratio, Travel, q16};
 
@@ -29,9 +29,6 @@ const SHOWS_WITHIN: Travel = q16(400_000).widen();
 /// lower by e the wheel may be over an edge that seems `sqrt(2 R e)` ahead; half as much again keeps
 /// to the first order in e.
 const SHOWN: Millimetres = Q16::from_bits(3 * HEIGHT_MOST.to_bits());
-/// Part by which the tread may give way otherwise than by its model, one sigma: that of its creep, of
-/// compliance, contact and friction together.
-const GIVES_OTHERWISE: Ratio = q16(350_000);
 /// Largest motion of the face in a tick, mm. More is a sensor that errs.
 const MOST: Millimetres = q16(800_000);
 
