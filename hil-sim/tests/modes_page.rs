@@ -40,7 +40,7 @@ fn edges() -> BTreeMap<(String, String), Vec<String>> {
     let mut edges: BTreeMap<(String, String), Vec<String>> = BTreeMap::new();
     // One hold stands for all.
     let hold = Mode::FaultHold(Fault::SelfTest);
-    for mode in Mode::WITHOUT_FAULT.into_iter().chain([hold]) {
+    for mode in Mode::WITHOUT_FAULT.map(|(mode, _)| mode).into_iter().chain([hold]) {
         for trigger in Trigger::WITHOUT_FAULT {
             let Some(after) = next(mode, trigger) else { continue };
             let ends = (name(mode), name(after));
