@@ -56,10 +56,8 @@ pub enum Kind {
 
 impl Kind {
     /// Every kind.
-    pub const ALL: [Self; 6] = {
-        use Kind::{Event, Identity, Ledger, Plan, Request, Ticks};
-        [Identity, Ticks, Plan, Request, Event, Ledger]
-    };
+    pub const ALL: [Self; 6] =
+        [Self::Identity, Self::Ticks, Self::Plan, Self::Request, Self::Event, Self::Ledger];
 }
 
 /// Head of a frame.

@@ -181,10 +181,7 @@ impl Rest<'_> {
     /// [`SetError::Content`] if the bytes are not one; `place` then holds anything.
     #[inline(never)]
     pub fn read_planner(self, place: &mut Planner) -> Result<(), SetError> {
-        match into(self.0, place)? {
-            [] => Ok(()),
-            _ => Err(SetError::Content),
-        }
+        into(self.0, place)?.is_empty().then_some(()).ok_or(SetError::Content)
     }
 }
 

@@ -29,8 +29,8 @@ pub enum RigError {
     },
     /// The step table is not ascending with room for a wheel between the steps.
     #[error(
-        "rig.step_positions_mm: step {step} is at {position_mm} mm, expected at least {least_mm:.1} \
-         mm: the wheel has to finish one step before it touches the next"
+        "rig.step_positions_mm: step {step} is at {position_mm} mm, expected at least \
+         {least_mm:.1} mm: the wheel has to finish one step before it touches the next"
     )]
     StepOrder {
         /// Position of the offending step in the table, from 1.

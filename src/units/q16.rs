@@ -101,13 +101,13 @@ impl Q16 {
 
 /// Implements an operator, and the one that assigns its result.
 macro_rules! operators {
-    ($($on:ident $name:ident $assigns:ident $assign:ident($a:ident, $b:ident) $result:expr;)*) => {$(
+    ($($on:ident $name:ident $assigns:ident $assign:ident($a:ident, $b:ident) $of:expr;)*) => {$(
         impl $on for Q16 {
             type Output = Self;
 
             fn $name(self, $b: Self) -> Self {
                 let $a = self;
-                $result
+                $of
             }
         }
 
