@@ -3,7 +3,7 @@
 #![deny(clippy::float_arithmetic)]
 
 use super::Mode;
-use super::crosscheck::{Compared, CrossCheck, CrossState, Noise, lasts};
+use super::crosscheck::{CrossCheck, CrossState, Noise, lasts};
 use super::readback::{Readback, ReadbackState};
 use crate::control::preload_loop::answer_s;
 use crate::fault::Fault;
@@ -159,35 +159,21 @@ impl Monitor {
         &self,
         state: &mut MonitorState,
         seen: &Observed<'_>,
-        preload_off: Newtons,
+        off: Newtons,
     ) -> Option<Fault> {
-        let sensed = seen.sensed;
-        let compared = Compared {
-            now: seen.now,
-            read_at: sensed.speed.at,
-            travel: seen.travel,
-            wound: seen.wound,
-            radius: sensed.radius.value,
-            preload: sensed.preload.value,
-            preload_due: seen.preload_due,
-            preload_off,
-            compression: sensed.compression.value,
-            speed_ref: seen.speed_ref,
-            effort: seen.effort,
-        };
         let before = core::mem::replace(&mut state.driving, seen.mode.moves());
         if state.driving {
             if !before {
-                state.cross.begin(&compared);
+                state.cross.begin(seen);
             }
-            self.cross.step(&mut state.cross, &state.noise, &compared)
+            self.cross.step(&mut state.cross, &state.noise, seen, off)
         } else if matches!(seen.mode, Mode::Preload(_)) {
-            self.cross.preload(&mut state.cross, &state.noise, &compared)
+            self.cross.preload(&mut state.cross, &state.noise, seen, off)
         } else {
             state.cross = CrossState::default();
             // A motion of the service mode is no noise.
             if seen.mode != Mode::Service {
-                state.noise.rest(&compared);
+                state.noise.rest(seen);
             }
             None
         }
