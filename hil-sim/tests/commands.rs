@@ -4,10 +4,10 @@
 use crate::common::{
     Bench, DIRECTIONS, Moment, NO_SLIP_MM, RIGS, check_each, end_mm, opposite, scenario, starter,
 };
+use hil_sim::plant::wall::touch_mm;
 use hil_sim::scenario::{Direction, Scenario};
 use hil_sim::testing::long;
 use interstage::estimate::ContactStage as Stage;
-use hil_sim::plant::wall::touch_mm;
 use interstage::fault::Fault;
 use interstage::rig::Rig;
 use interstage::sense::raw::SensorId;

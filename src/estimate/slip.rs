@@ -114,8 +114,7 @@ impl CornerSlip {
 
     /// A run begins: nothing is known of how wheel and axle moved since the last one.
     pub(super) fn begin_run(&mut self) {
-        *self =
-            Self { lost: self.lost, beside: self.beside, noise: self.noise, ..Self::default() };
+        *self = Self { lost: self.lost, beside: self.beside, noise: self.noise, ..Self::default() };
     }
 
     /// The wheel slips, or has not been seen to grip since.

@@ -67,7 +67,13 @@ impl Pulls {
 
     /// The first run begins at this travel: the tread has relaxed under its load, N; 1 mm of it
     /// `carries` so much, N.
-    pub(super) fn begin(&self, state: &mut WindUp, travel: Travel, load: Newtons, carries: Newtons) {
+    pub(super) fn begin(
+        &self,
+        state: &mut WindUp,
+        travel: Travel,
+        load: Newtons,
+        carries: Newtons,
+    ) {
         if !core::mem::replace(&mut state.known, true) {
             (state.winding, state.from) = (self.shear.rest(load), travel);
             state.carries = carries;

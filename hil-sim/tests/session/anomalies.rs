@@ -209,9 +209,11 @@ fn a_missing_step_is_searched_for_and_given_up() {
 /// driving onto the stow stop.
 #[test]
 fn a_retraction_that_starts_a_level_off_ends_safely() {
-    for (step, expected) in
-        [(1, None), (2, Some(vec![Fault::LevelMismatch.code()])), (3, Some(vec![Fault::LevelMismatch.code()]))]
-    {
+    for (step, expected) in [
+        (1, None),
+        (2, Some(vec![Fault::LevelMismatch.code()])),
+        (3, Some(vec![Fault::LevelMismatch.code()])),
+    ] {
         let scenario = with(Direction::Retract, StepAnomaly::Missing { step });
         let got = outcome(&scenario);
         let name = format!("step {step}");
