@@ -321,7 +321,7 @@ fn a_plan_names_what_keeps_the_crossing_from_being_faster() {
     };
     assert_eq!(by(&|_| (), Direction::Deploy), LimitedBy::Preload);
     assert_eq!(by(&|_| (), Direction::Retract), LimitedBy::Drive);
-    let little = |rig: &mut Rig| rig.plant.mu = 0.78;
+    let little = |rig: &mut Rig| (rig.plant.mu, rig.plant.top_load_share) = (0.85, 0.7);
     assert_eq!(by(&little, Direction::Deploy), LimitedBy::Friction);
     let narrow = |rig: &mut Rig| rig.control.gap_ref_mm = 2.3;
     assert_eq!(by(&narrow, Direction::Deploy), LimitedBy::LeastSpeed);
