@@ -353,7 +353,7 @@ fn reported_values_follow_the_true_ones() {
         let bounds = if *nominal {
             // What the tread gives way by, half a step's residual and a wheel that is not worn yet; six deviations of the noise and a millisecond
             // of the screw; a code of the angle and 5 ms of lag.
-            [0.8, 0.3 + 1e-3 * preload.slew_n_per_s, 0.2, 0.08]
+            [0.9, 0.3 + 1e-3 * preload.slew_n_per_s, 0.2, 0.08]
         } else {
             [0.9, 0.3 + 0.015 * preload.limit_n, 0.35, 0.13]
         };

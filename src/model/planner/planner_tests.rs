@@ -323,7 +323,7 @@ fn a_plan_names_what_keeps_the_crossing_from_being_faster() {
     assert_eq!(by(&|_| (), Direction::Retract), LimitedBy::Drive);
     let little = |rig: &mut Rig| (rig.plant.mu, rig.plant.top_load_share) = (0.85, 0.7);
     assert_eq!(by(&little, Direction::Deploy), LimitedBy::Friction);
-    let narrow = |rig: &mut Rig| rig.control.gap_ref_mm = 2.3;
+    let narrow = |rig: &mut Rig| rig.control.gap_ref_mm = 2.1;
     assert_eq!(by(&narrow, Direction::Deploy), LimitedBy::LeastSpeed);
 }
 
