@@ -413,6 +413,22 @@ mod tests {
     }
 
     #[test]
+    fn an_edge_under_a_climbing_wheel_shows_creep() {
+        for part in [-0.3, 0.3] {
+            let mut odometry = Odometry::default();
+            odometry.set(Travel::ZERO, Q16::from_num(50));
+            odometry.correct(Q16::from_num(50), Q16::ZERO);
+            odometry.give([q16(2_000_000), Q16::ZERO]);
+            // The axle lags by more than the model has it: the edge seems to move outwards.
+            let position = odometry.position(Travel::ZERO);
+            odometry.climb(position, Q16::from_num(2.0 * part));
+            let (taken, more) = (position - odometry.position(Travel::ZERO), odometry.more[0]);
+            let (taken, more) = (taken.to_num::<f64>() / (2.0 * part), more.to_num::<f64>() / part);
+            assert!((0.5..1.0).contains(&taken) && (0.5..1.0).contains(&more), "{taken} {more}");
+        }
+    }
+
+    #[test]
     fn the_same_steps_found_again_and_again_leave_the_radius_alone() {
         let mut odometry = Odometry::default();
         odometry.set(Travel::ZERO, Q16::ZERO);

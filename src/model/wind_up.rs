@@ -187,3 +187,33 @@ impl Spread {
         self.gave.saturating_sub(self.held)
     }
 }
+
+#[cfg(test)]
+#[allow(clippy::float_arithmetic, reason = "the reference is in f64")]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_patch_that_rolls_lags_in_the_second_order() {
+        let (shear, tau_s) =
+            (Shear::try_build(&Rig::prototype()).unwrap(), Rig::prototype().tread.tau_s);
+        for speed in [0.0, 8.0, 20.0, 40.0] {
+            let mut winding = Winding::default();
+            let pull = Pull {
+                traction: Q16::ZERO,
+                normal: q16(30_000_000),
+                contact: q16(8_000_000),
+                rolled: Q16::from_num(0.008 * speed),
+                floor: Q16::ONE,
+                patch: q16(5_000_000),
+                duration: q16(8_000),
+            };
+            for _ in 0..1000 {
+                let _ = shear.roll(&mut winding, &pull);
+            }
+            let lag = speed * tau_s / 5.0;
+            let (sunk, exact) = (winding.sunk.to_num::<f64>(), 1.0 / (1.0 + lag * lag));
+            assert!((sunk - exact).abs() < 0.01, "{speed}: {sunk} {exact}");
+        }
+    }
+}
