@@ -78,7 +78,7 @@ fn data(message: &[u8]) -> &[u8] {
 
 fn add(boot: &mut Boot, body: Body<'_>) {
     match body {
-        Body::Ticks(ticks) => boot.ticks.extend(ticks.map(Result::unwrap)),
+        Body::Ticks(ticks) => boot.ticks.extend(ticks.map(Option::unwrap)),
         Body::Plan(at, plan) => boot.plans.push((at, plan)),
         Body::Request(at, request) => boot.requests.push((at, request)),
         Body::Event(Entry { event: Event::Restart(restart), .. }) => boot.restart = Some(restart),

@@ -76,7 +76,7 @@ impl DeltaRecord {
             word(bridges[0], bridges[1]),
             word(t.drive.to_bits() as u16, t.pretightener.to_bits() as u16),
             u32::from_le_bytes([t.level, t.stage as u8, codes::of_mode(t.mode), 0]),
-            flags.to_bits().into(),
+            flags.0.into(),
         ];
         Self {
             numbers: filled([t.at].into_iter().chain(ages).chain(quantities)),
@@ -111,7 +111,7 @@ impl DeltaRecord {
             codes: filled(sensors.iter().flat_map(|word| halves(*word))),
             ages,
             bridges: halves(bridges),
-            flags: Flags::from_bits(u16::try_from(flags).ok()?),
+            flags: Flags(u16::try_from(flags).ok()?),
         })
     }
 

@@ -136,7 +136,8 @@ impl Judge {
     /// Looks at a tick: the controller's output and the true state after it. `active`: the
     /// fault is active.
     pub fn look(&mut self, t_s: f64, output: &Output, truth: &Truth, active: bool) {
-        let moved_mm = truth.position_mm - self.position_mm;
+        // An axle that sinks on the rubber of a wheel that stands is held.
+        let moved_mm = truth.rigid_mm_s * TICK_S;
         self.position_mm = truth.position_mm;
         self.mode = output.telemetry.mode;
         // The wheel follows the reference with a lag: the recent maximum counts.
@@ -162,7 +163,7 @@ impl Judge {
             }
         }
         let off = !output.drive.enable && !output.preload.enable;
-        let still = truth.speed_mm_s.abs() < REST_MM_S && truth.tread_mm_s.abs() < REST_MM_S;
+        let still = truth.rigid_mm_s.abs() < REST_MM_S && truth.tread_mm_s.abs() < REST_MM_S;
         self.rest_s = (off && still).then(|| self.rest_s.unwrap_or(t_s));
     }
 
@@ -284,7 +285,7 @@ mod tests {
     /// A judge that has seen `ticks` of this mode at this reference and true speed, mm/s,
     /// under this preload, N.
     fn judged(mode: Mode, asked: f64, speed: f64, preload_n: f64, ticks: u32) -> Judge {
-        let mut truth = Truth { preload_n, speed_mm_s: speed, ..Truth::default() };
+        let mut truth = Truth { preload_n, rigid_mm_s: speed, ..Truth::default() };
         let mut judge = Judge::new(&Scenario::default(), &truth);
         let mut output = Output::default();
         output.telemetry.mode = mode;

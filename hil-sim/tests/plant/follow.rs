@@ -7,16 +7,19 @@ use hil_sim::session::{Options, RunningRig, Session};
 
 use super::bench::{TICK_S, nominal, steps};
 
-/// Bound on the position, mm, per millisecond of the step: a ninth of the travel. The
+/// Bound on the position, mm, per millisecond of the step: a quarter of the travel. The
 /// following wheel turns evenly within a step and pivots by the forces of the one before.
-const POSITION_MM: f64 = 0.0035;
-/// Bound on the height, mm: the arm's modes, which a following rig does not have.
-const SHAKEN_MM: f64 = 0.03;
+const POSITION_MM: f64 = 0.0075;
+/// Bound on the height, mm: the ripple on the arm's modes, which a following rig does not have.
+const SHAKEN_MM: f64 = 0.002;
 
 #[test]
 fn following_the_rotation_and_preload_of_a_run_gives_that_run() {
     let mut scenario = Scenario::default();
     scenario.run.seed = 3;
+    // The load does not shake the arm: no sensor shows what its modes press with, and the axle
+    // swings on its tread by that.
+    scenario.mismatch.mode_shape = 0.0;
     let mut session = Session::new(&scenario, Options::default()).unwrap();
     let mut parameters = scenario.plant();
     let mut truths = vec![*session.plant().truth()];
@@ -44,7 +47,7 @@ fn following_the_rotation_and_preload_of_a_run_gives_that_run() {
         }
         // The arm's modes vanish in the mean; what a step of time leaves grows with it.
         let mean: f64 = height / count;
-        assert!(mean.abs() < 1.2e-4 * step as f64, "{step}: {mean}");
+        assert!(mean.abs() < 1.5e-4 * step as f64, "{step}: {mean}");
     }
 }
 

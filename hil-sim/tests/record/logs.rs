@@ -24,7 +24,7 @@ use serde_json::Value;
 /// Largest error of the log while moving. Position: the tolerance of the steps'
 /// places, which the controller knows from its table and corrects itself by. Preload: two
 /// deviations of the preload sensor's gain at 50 N, six of its noise, and its age.
-const POSITION_MM: f64 = 0.8;
+const POSITION_MM: f64 = 1.0;
 const PRELOAD_N: f64 = 1.0;
 
 pub(crate) fn data(name: &str) -> PathBuf {
