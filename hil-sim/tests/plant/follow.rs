@@ -10,7 +10,8 @@ use super::bench::{TICK_S, nominal, steps};
 /// Bound on the position, mm, per millisecond of the step: a quarter of the travel. The
 /// following wheel turns evenly within a step and pivots by the forces of the one before.
 const POSITION_MM: f64 = 0.0075;
-/// Bound on the height, mm: the ripple on the arm's modes, which a following rig does not have.
+/// Bound on the height, mm, per millisecond of the step: the ripple on the arm's modes, which a
+/// following rig does not have, and an axle that is late by a step on a corner.
 const SHAKEN_MM: f64 = 0.002;
 
 #[test]
@@ -41,7 +42,8 @@ fn following_the_rotation_and_preload_of_a_run_gives_that_run() {
             let t = rig.truth();
             let off = (t.position_mm - b.position_mm).abs();
             assert!(off < POSITION_MM * step as f64, "{step} {k}: {t:?} {b:?}");
-            assert!((t.height_mm - b.height_mm).abs() < SHAKEN_MM, "{step} {k}: {t:?} {b:?}");
+            let high = (t.height_mm - b.height_mm).abs();
+            assert!(high < SHAKEN_MM * step as f64, "{step} {k}: {t:?} {b:?}");
             height += t.height_mm - b.height_mm;
             count += 1.0;
         }

@@ -348,14 +348,17 @@ fn reported_values_follow_the_true_ones() {
         ("radius", |seen, t| (seen.radius_mm, t.radius_true_mm)),
         ("compression", |seen, t| (seen.compression_mm, t.compression_true_mm)),
     ];
-    for Run { name, scenario, rows, nominal, .. } in RUNS.iter() {
+    for Run { name, scenario, rows, nominal, summary, .. } in RUNS.iter() {
         let preload = &scenario.rig.preload;
+        // The position by what the tread gives way by on a corner, more under three times the load.
+        // The sensor shows the wheel's speed, the plant the axle's, which lunges at lift-off.
+        let (gives, lunge) = if summary.rig == "fe" { (1.3, 3.2) } else { (0.7, 2.5) };
         let bounds = if *nominal {
-            // What the tread gives way by, half a step's residual and a wheel that is not worn yet; six deviations of the noise and a millisecond
-            // of the screw; a code of the angle and 5 ms of lag.
-            [0.9, 0.3 + 1e-3 * preload.slew_n_per_s, 0.2, 0.08]
+            // Six deviations of the noise and a millisecond of the screw; a code of the angle and
+            // 5 ms of lag.
+            [gives, 0.3 + 1e-3 * preload.slew_n_per_s, 0.2, 0.08]
         } else {
-            [0.9, 0.3 + 0.015 * preload.limit_n, 0.35, 0.13]
+            [gives, 0.3 + 0.015 * preload.limit_n, 0.35, 0.13]
         };
         let (mut bias, mut squares, mut moving, mut ticks) = (0.0, 0.0, 0, 0);
         for row in rows.iter().filter(|row| row.controller.mode >= mode("idle")) {
@@ -375,7 +378,7 @@ fn reported_values_follow_the_true_ones() {
         bias /= f64::from(ticks);
         assert!(!nominal || bias.abs() < 0.02, "{name}: preload bias {bias}");
         let speed = (squares / f64::from(moving)).sqrt();
-        assert!(speed < 2.5, "{name}: speed off by {speed} mm/s, rms");
+        assert!(speed < lunge, "{name}: speed off by {speed} mm/s, rms");
     }
 }
 
