@@ -39,10 +39,6 @@ const DIP_PART: f64 = 0.12;
 /// observer then has three counts within its settling time.
 const LARGEST_COUNT_MM: f64 = 0.08;
 
-/// Largest force limit of a drive, in cruise preloads: a motor's force ripples by about 0.6 % of its
-/// limit, which is then 6 % of the preload, about half of the usual friction margin.
-const LARGEST_DRIVE: f64 = 10.0;
-
 /// Travel of the reference that a wheel which has not turned may stay behind, mm: on a corner the
 /// integral part of the speed loop first has to find the duty that lifts it.
 pub(crate) const START_LAG_MM: f64 = 2.0;
@@ -66,7 +62,7 @@ impl Rig {
         // What the proportional part adds, whatever the load.
         let corrected =
             drive.stall_force_n * PROPORTIONAL * MOST_ERROR_MM_S / drive.no_load_speed_mm_s;
-        let checks: [(_, _, &[&'static str], _); 10] = [
+        let checks: [(_, _, &[&'static str], _); 9] = [
             (
                 self.sense.encoder_counts,
                 Bound::AtLeast(turn_mm / LARGEST_COUNT_MM),
@@ -127,12 +123,6 @@ impl Rig {
                     "preload.limit_n",
                 ],
                 "the drive does not accelerate as planned, or climb with preload.limit_n",
-            ),
-            (
-                drive.force_limit_n,
-                Bound::AtMost(LARGEST_DRIVE * preload.cruise_n),
-                &["drive.force_limit_n", "preload.cruise_n"],
-                "the force ripple of so strong a drive takes the friction margin",
             ),
             (
                 drive.stall_force_n,

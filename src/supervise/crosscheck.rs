@@ -4,6 +4,8 @@
 
 #![deny(clippy::float_arithmetic)]
 
+use core::array::from_fn;
+
 use super::Observed;
 use crate::fault::Fault;
 use crate::numeric::checked;
@@ -148,8 +150,8 @@ pub(super) struct CrossState {
     past: [Millimetres; 2 * SPAN],
     held: usize,
     at: Tick,
-    /// Encoder and reference at the last progress.
-    progress: (Travel, Travel),
+    /// Encoder, travel and reference at the last progress.
+    progress: [Travel; 3],
     /// Number of progresses, up to [`TURNED`].
     turned: u8,
     /// Radius and encoder when arm and wheel were last set equal, and the ticks since.
@@ -279,17 +281,18 @@ impl CrossCheck {
         known && (bend.abs() > self.bent || (now - old).abs() > self.off)
     }
 
-    /// Whether the reference goes on while the wheel does not.
+    /// Whether the axle falls behind its reference while it or the wheel stands.
     fn lags(&self, state: &mut CrossState, seen: &Observed<'_>) -> bool {
-        let (travel, reference) = state.progress;
-        let moved = Q16::narrow(seen.travel.saturating_sub(travel));
-        if moved.abs() > self.progress {
-            state.progress = (seen.travel, state.reference);
+        let now = [seen.turned, seen.travel, state.reference];
+        let [turned, moved, asked] =
+            from_fn(|i| Q16::narrow(now[i].wrapping_sub(state.progress[i])));
+        if turned.abs().min(moved.abs()) > self.progress {
+            state.progress = now;
             state.turned = state.turned.saturating_add(1).min(TURNED);
             return false;
         }
         let most = if state.turned < TURNED { self.start_lag } else { self.lag };
-        Q16::narrow(state.reference.saturating_sub(reference)).abs() > most
+        (asked - moved).abs() > most
     }
 }
 
@@ -346,7 +349,7 @@ impl CrossState {
             past: [Q16::narrow(seen.travel); 2 * SPAN],
             held: 2 * SPAN,
             at: seen.now.wrapping_sub(1),
-            progress: (seen.travel, Travel::ZERO),
+            progress: [seen.turned, seen.travel, Travel::ZERO],
             strayed: self.strayed,
             preload: self.preload,
             ..Self::default()

@@ -65,8 +65,10 @@ pub struct Observed<'a> {
     pub mode: Mode,
     /// Sensors.
     pub sensed: &'a SensedState,
-    /// Travel of the wheel.
+    /// Travel that the drive is asked for, by the axle.
     pub travel: Travel,
+    /// Travel by the encoder.
+    pub turned: Travel,
     /// How far the tread is wound up, mm.
     pub wound: Millimetres,
     /// Readback of the bridges since the last tick.
