@@ -195,8 +195,7 @@ pub struct Sensors {
 #[cfg_attr(not(target_os = "none"), derive(documented::DocumentedFields))]
 #[serde(deny_unknown_fields)]
 pub struct ControlSettings {
-    /// Gap to hold at a step, mm; 0 takes the gap at `safe_speed_mm_s` and cruise
-    /// preload.
+    /// Gap to hold at a step, mm; 0 takes that at `safe_speed_mm_s` and cruise preload.
     pub gap_ref_mm: f64,
     /// Speed of the paper's safe point, mm/s. Published: 5.
     pub safe_speed_mm_s: f64,

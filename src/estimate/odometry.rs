@@ -126,8 +126,7 @@ impl Odometry {
         *self = Self { offset, origin: position, ..Self::default() };
     }
 
-    /// Declares that the wheel is at `position` because a step was found: as sure as that
-    /// step's place.
+    /// Declares that the wheel is at `position`: a step was found there, as sure as its place.
     pub fn set_by_step(&mut self, travel: Travel, position: Millimetres) {
         self.set(travel, position);
         self.covariance[0][0] = Ratio::ONE;

@@ -17,8 +17,7 @@ use crate::units::{Duty, Q16};
 const AGES: usize = SensorId::COUNT.div_ceil(4);
 const CODES: usize = SensorId::COUNT.div_ceil(2);
 
-/// Fields of a record coded as differences: the tick, the ages, and the quantities of
-/// [`Telemetry`].
+/// Fields of a record coded as differences: tick, ages, and those of [`Telemetry`].
 const NUMBERS: usize = 1 + AGES + Telemetry::QUANTITIES;
 
 /// Words of a record that are copied.

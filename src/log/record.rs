@@ -1,5 +1,4 @@
-//! One tick in the log: all inputs and outputs, so that a host can run it again and compare
-//! bits.
+//! One tick in the log: all inputs and outputs, so that a host can compare its bits.
 
 use crate::sense::raw::{BridgeCode, BridgeCodes, Sample, SensorFrame, SensorId};
 use crate::supervise::{Command, codes};

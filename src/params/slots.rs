@@ -274,8 +274,7 @@ impl Draft {
     }
 }
 
-/// Reads a controller; like the planner in a frame of its own, so that the stack never holds
-/// both.
+/// Reads a controller, in a frame of its own: the stack never holds it and the planner.
 #[inline(never)]
 fn check_controller<'a>(set: &ParameterSet<'a>) -> Result<Rest<'a>, SetError> {
     set.read_controller(&mut Controller::default())

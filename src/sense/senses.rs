@@ -60,8 +60,7 @@ pub struct SensedState {
     pub compression: Reading<Millimetres>,
     /// The same through its low-pass, mm.
     pub compression_filtered: Millimetres,
-    /// Wheel centre's distance from the pillar axis, mm, through the low-pass of
-    /// the angle.
+    /// Wheel centre's distance from the pillar axis, mm, by the low-pass of the angle.
     pub radius: Reading<Millimetres>,
     /// Tangent of the arm angle.
     pub tan_arm: Ratio,

@@ -59,8 +59,7 @@ const STRAYED_TICKS: u16 = 10;
 const STUCK: u16 = 64;
 /// Ticks of rest over which the changes of a code are counted: fewer than the self-test's.
 const NOISE_TICKS: u16 = 64;
-/// Chance of a run of equal codes that counts as stuck, as the negative of its natural logarithm:
-/// 1e-12.
+/// Chance of a run of equal codes that counts as stuck, as -ln: 1e-12.
 const RARE: u16 = 28;
 /// Change within a tick that no force can make, N: the spring yields 36 N/s at cruise speed.
 const JUMP_N: Newtons = q16(4_000_000);
@@ -292,7 +291,7 @@ impl CrossCheck {
             return false;
         }
         let most = if state.turned < TURNED { self.start_lag } else { self.lag };
-        (asked - moved).abs() > most
+        (if asked < Q16::ZERO { moved - asked } else { asked - moved }) > most
     }
 }
 
