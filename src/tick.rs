@@ -200,7 +200,6 @@ impl Controller {
             mode: state.mode,
             sensed: tick.sensed,
             travel: state.estimate.driven(tick.sensed),
-            turned: state.estimate.turns(tick.sensed).0,
             wound: state.estimate.wound(),
             bridges: input.sensors.bridges,
             speed_ref: state.signed_speed(),

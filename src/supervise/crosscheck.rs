@@ -4,8 +4,6 @@
 
 #![deny(clippy::float_arithmetic)]
 
-use core::array::from_fn;
-
 use super::Observed;
 use crate::fault::Fault;
 use crate::numeric::checked;
@@ -149,8 +147,8 @@ pub(super) struct CrossState {
     past: [Millimetres; 2 * SPAN],
     held: usize,
     at: Tick,
-    /// Encoder, travel and reference at the last progress.
-    progress: [Travel; 3],
+    /// Travel and reference at the last progress.
+    progress: (Travel, Travel),
     /// Number of progresses, up to [`TURNED`].
     turned: u8,
     /// Radius and encoder when arm and wheel were last set equal, and the ticks since.
@@ -280,18 +278,21 @@ impl CrossCheck {
         known && (bend.abs() > self.bent || (now - old).abs() > self.off)
     }
 
-    /// Whether the axle falls behind its reference while it or the wheel stands.
+    /// Whether the axle falls behind its reference without progress.
     fn lags(&self, state: &mut CrossState, seen: &Observed<'_>) -> bool {
-        let now = [seen.turned, seen.travel, state.reference];
-        let [turned, moved, asked] =
-            from_fn(|i| Q16::narrow(now[i].wrapping_sub(state.progress[i])));
-        if turned.abs().min(moved.abs()) > self.progress {
-            state.progress = now;
+        let (travel, reference) = state.progress;
+        let along = |d: Travel| {
+            let d = Q16::narrow(d);
+            if seen.speed_ref < Q16::ZERO { -d } else { d }
+        };
+        let moved = along(seen.travel.saturating_sub(travel));
+        if moved > self.progress {
+            state.progress = (seen.travel, state.reference);
             state.turned = state.turned.saturating_add(1).min(TURNED);
             return false;
         }
         let most = if state.turned < TURNED { self.start_lag } else { self.lag };
-        (if asked < Q16::ZERO { moved - asked } else { asked - moved }) > most
+        along(state.reference.saturating_sub(reference)) - moved > most
     }
 }
 
@@ -348,7 +349,7 @@ impl CrossState {
             past: [Q16::narrow(seen.travel); 2 * SPAN],
             held: 2 * SPAN,
             at: seen.now.wrapping_sub(1),
-            progress: [seen.turned, seen.travel, Travel::ZERO],
+            progress: (seen.travel, Travel::ZERO),
             strayed: self.strayed,
             preload: self.preload,
             ..Self::default()

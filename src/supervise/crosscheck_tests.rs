@@ -36,7 +36,6 @@ impl Compared {
             mode: Mode::Idle,
             sensed: &sensed,
             travel: self.travel,
-            turned: self.travel,
             wound: Q16::ZERO,
             bridges: None,
             speed_ref: self.speed_ref,
@@ -402,7 +401,7 @@ fn of_what_shows_in_one_tick_the_arm_is_named_before_the_wheel_that_stands() {
     let stands = CrossState {
         reference: ahead,
         past: [Q16::narrow(seen.travel.wrapping_sub(ahead)); 2 * SPAN],
-        progress: [seen.travel, seen.travel, Travel::ZERO],
+        progress: (seen.travel, Travel::ZERO),
         ..state
     };
     let moves = |by: i32| (seen.radius - Q16::from_num(by), seen.travel);

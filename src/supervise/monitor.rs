@@ -67,8 +67,6 @@ pub struct Observed<'a> {
     pub sensed: &'a SensedState,
     /// Travel that the drive is asked for, by the axle.
     pub travel: Travel,
-    /// Travel by the encoder.
-    pub turned: Travel,
     /// How far the tread is wound up, mm.
     pub wound: Millimetres,
     /// Readback of the bridges since the last tick.

@@ -57,7 +57,6 @@ fn observed(mode: Mode, sensed: &SensedState) -> Observed<'_> {
         mode,
         sensed,
         travel: sensed.travel,
-        turned: sensed.travel,
         wound: Q16::ZERO,
         bridges: Some(IDLE),
         speed_ref: Q16::ZERO,
