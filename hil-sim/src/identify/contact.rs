@@ -10,7 +10,7 @@ use std::ops::Range;
 use nalgebra::DMatrix;
 
 use super::IdentifyError;
-use super::coordinates::{Coordinates, FRICTION};
+use super::coordinates::{COMPLIANCE_OFF, CREEP, Coordinates, FRICTION};
 use super::forward::{Channels, Run, Trajectory, derivatives, quotient, simulate};
 use super::least_squares::{Model, Noise, minimise, robust};
 
@@ -139,7 +139,10 @@ pub fn fit(
         fitted = other.filter(|other| other.residuals.norm() < left).unwrap_or(fitted);
     }
     let blocks = model.blocks();
-    let covariance = robust(&fitted.jacobian, &fitted.residuals, &blocks, WIDENED)?;
+    let mut covariance = robust(&fitted.jacobian, &fitted.residuals, &blocks, WIDENED)?;
+    // What the compliance is off by moves what the logs weigh against it along.
+    let along = covariance.column(CREEP) / covariance[(CREEP, CREEP)];
+    covariance += COMPLIANCE_OFF * COMPLIANCE_OFF * &along * along.transpose();
     let residuals = model.remaining(&fitted.x, &fitted.at);
     Ok(Contact { covariance, trajectories: fitted.at, x: fitted.x, residuals })
 }

@@ -200,13 +200,9 @@ impl Document<'_> {
     ) -> Parameter {
         let of = |x: f64| of(x, &self.scenario.rig);
         let (x, prior) = (self.contact.x[index], self.coordinates.priors()[index]);
-        let off = match index {
-            // A bridge cuts some pulses short, at full duty none: the drive's as the pre-tightener's.
-            NO_LOAD => self.lost,
-            CREEP => COMPLIANCE_OFF,
-            _ => 0.0,
-        };
-        let deviation = self.contact.covariance[(index, index)].sqrt().hypot(off);
+        // A bridge cuts some pulses short, at full duty none: the drive's as the pre-tightener's.
+        let cut = if index == NO_LOAD { self.lost } else { 0.0 };
+        let deviation = self.contact.covariance[(index, index)].sqrt().hypot(cut);
         let ends = [of(x - NORMAL_95 * deviation), of(x + NORMAL_95 * deviation)];
         let leaves = if prior.tolerance { LEAVES.1 } else { LEAVES.0 };
         let identified = deviation < leaves * prior.deviation;
