@@ -123,6 +123,21 @@ fn found(mut at: impl FnMut(f64) -> Rolls) -> Option<(Fault, i32)> {
     })
 }
 
+/// As of an encoder that sticks on a corner: the tread winds up, so that the axle seems to go back.
+#[test]
+fn an_axle_that_recedes_makes_no_progress() {
+    let recedes = |back: f64| {
+        found(|t| {
+            let (before, late) = (20.0 * (t.min(0.0) + 0.1), t.max(0.0));
+            Rolls { travel: before - back * late, reference: before + 2.0 * late, ..ROLLS }
+        })
+    };
+    for (back, within) in [(0.0, 240), (1.6, 140)] {
+        let (fault, after) = recedes(back).expect("found");
+        assert!(fault == Fault::DriveStalled && after < within, "{back}: {fault:?} {after} ms");
+    }
+}
+
 /// A wheel at constant speed, mm/s, that leaves it with this acceleration, mm/s^2.
 fn leaves(speed: f64, acceleration: f64) -> Option<(Fault, i32)> {
     found(|t| {
