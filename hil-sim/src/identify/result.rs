@@ -10,9 +10,7 @@ use toml::{Table, Value};
 use super::IdentifyError;
 use super::actuator::{self, Actuator};
 use super::contact::{self, Contact};
-use super::coordinates::{
-    COMPLIANCE_OFF, CREEP, Coordinates, LOAD_GAIN, NO_LOAD, RADIUS, ROWS, itself,
-};
+use super::coordinates::{Coordinates, LOAD_GAIN, NO_LOAD, RADIUS, ROWS, itself};
 use super::forward::{CHANNELS, Run};
 use super::least_squares::Noise;
 use super::record::Record;
