@@ -10,7 +10,7 @@ use std::ops::Range;
 use nalgebra::DMatrix;
 
 use super::IdentifyError;
-use super::coordinates::{COMPLIANCE_OFF, CREEP, Coordinates, FRICTION};
+use super::coordinates::{Coordinates, FRICTION, OFF};
 use super::forward::{Channels, Run, Trajectory, derivatives, quotient, simulate};
 use super::least_squares::{Model, Noise, minimise, robust};
 
@@ -140,9 +140,11 @@ pub fn fit(
     }
     let blocks = model.blocks();
     let mut covariance = robust(&fitted.jacobian, &fitted.residuals, &blocks, WIDENED)?;
-    // What the compliance is off by moves what the logs weigh against it along.
-    let along = covariance.column(CREEP) / covariance[(CREEP, CREEP)];
-    covariance += COMPLIANCE_OFF * COMPLIANCE_OFF * &along * along.transpose();
+    // What the model is off by moves what the logs weigh against it along.
+    for (index, off) in OFF {
+        let along = covariance.column(index) / covariance[(index, index)];
+        covariance += off * off * &along * along.transpose();
+    }
     let residuals = model.remaining(&fitted.x, &fitted.at);
     Ok(Contact { covariance, trajectories: fitted.at, x: fitted.x, residuals })
 }
