@@ -114,6 +114,7 @@ impl Pulls {
             patch: sqrt(pulled.floor * (self.radius + self.radius)),
             duration: ticks_to_seconds(PERIOD.into()),
         };
+        self.shear.sink(&mut state.winding, &pull);
         let gives = odometry.give(self.shear.roll(&mut state.winding, &pull));
         state.spread.owes += gives.widen();
     }

@@ -142,8 +142,8 @@ impl Shear {
         let part = between(part, Q16::ZERO, MOST);
         let rolls = divide(pull.rolled, pull.contact);
         let (relaxes, renewed) = (pull.duration * self.per_tau, rolls + rolls);
-        let all = Ratio::ONE + relaxes + renewed;
-        let (follows, kept) = (divide(relaxes, all), divide(state.memory, all));
+        let keeps = divide(Ratio::ONE, Ratio::ONE + relaxes + renewed);
+        let (follows, kept) = (relaxes * keeps, state.memory * keeps);
         let pulls = pull.traction * self.compliance;
         let stiffer = Ratio::ONE + self.stiffens * (Ratio::ONE - follows);
         let displaced = divide(pulls + self.stiffens * kept, stiffer);
@@ -152,15 +152,20 @@ impl Shear {
         let carter = Ratio::ONE + sqrt(Ratio::ONE - part);
         let creeps = divide(pulls * renewed, self.relaxation_lengths * rolling * carter);
         let winds = displaced - state.displaced;
-        let floor = follows * pull.floor + divide(state.floor, all);
+        (state.displaced, state.memory) = (displaced, follows * displaced + kept);
+        state.floor = follows * pull.floor + state.floor * keeps;
+        [creeps, winds]
+    }
+
+    /// Sinks on under a pull.
+    pub fn sink(&self, state: &mut Winding, pull: &Pull) {
+        let relaxes = pull.duration * self.per_tau;
         // The half of a patch that sinks in leads its memory by about as much as the other half lags:
         // what is left is of the second order in the travel of a relaxation over half the patch.
         let passes = divide(pull.rolled, pull.patch.max(pull.rolled));
         let renewed = passes * divide(passes, relaxes.max(Q16::DELTA)).min(Ratio::ONE);
         let all = Ratio::ONE + relaxes + renewed;
-        let sunk = divide(relaxes * pull.floor + state.sunk, all);
-        *state = Winding { displaced, memory: follows * displaced + kept, floor, sunk };
-        [creeps, winds]
+        state.sunk = divide(relaxes * pull.floor + state.sunk, all);
     }
 }
 
@@ -209,7 +214,7 @@ mod tests {
                 duration: q16(8_000),
             };
             for _ in 0..1000 {
-                let _ = shear.roll(&mut winding, &pull);
+                shear.sink(&mut winding, &pull);
             }
             let lag = speed * tau_s / 5.0;
             let (sunk, exact) = (winding.sunk.to_num::<f64>(), 1.0 / (1.0 + lag * lag));
