@@ -272,10 +272,11 @@ fn a_session_goes_out_back_and_out_again() {
             let off = |gap: f64| gap / crossing.gap_mm - 1.0;
             let measured = off(record.gap_measured.to_num());
             let predicted = off(record.gap_predicted.to_num());
-            assert!(measured.abs() < 0.03, "{rig} {crossing:?}: {measured}");
             // A tread that is pressed three times as deep remembers more than the last half
-            // millimetre, over which the speed of a crossing is taken.
-            let bound = if rig == "fe" { 0.06 } else { 0.05 };
+            // millimetre, over which the speed of a crossing is taken; three sigmas of a measured
+            // gap are 0.11 mm.
+            let (read, bound) = if rig == "fe" { (0.06, 0.06) } else { (0.03, 0.05) };
+            assert!(measured.abs() < read, "{rig} {crossing:?}: {measured}");
             assert!(predicted.abs() < bound, "{rig} {crossing:?}: {predicted}");
         }
     }

@@ -115,8 +115,7 @@ impl Pulls {
             duration: ticks_to_seconds(PERIOD.into()),
         };
         self.shear.sink(&mut state.winding, &pull);
-        let gives = odometry.give(self.shear.roll(&mut state.winding, &pull));
-        state.spread.owes += gives.widen();
+        state.spread.owes += odometry.give(self.shear.roll(&mut state.winding, &pull)).widen();
     }
 
     /// Traction outwards and normal force, N: on an edge, at the angle t from below the centre,

@@ -238,7 +238,7 @@ mod tests {
             let mut other = one;
             other.telemetry.at = one.telemetry.at.wrapping_add(1);
             other.telemetry.speed = Q16::from_bits(step.into());
-            prop_assert_eq!(written(&one, &other).len(), 4 + 2 * usize::from(step != 0));
+            prop_assert_eq!(written(&one, &other).len(), MAP + 2 * usize::from(step != 0));
         }
     }
 
@@ -247,11 +247,11 @@ mod tests {
         let before = Record::default();
         let mut after = before;
         after.telemetry.at += 1;
-        assert_eq!(written(&before, &after).len(), 4);
+        assert_eq!(written(&before, &after).len(), MAP);
         // Parity and age of the arm's frame alternate.
         after.codes[3] ^= 0x8000;
         after.ages[3] += 1;
-        assert_eq!(written(&before, &after).len(), 4 + 4 + 2);
+        assert_eq!(written(&before, &after).len(), MAP + 4 + 2);
     }
 
     #[test]

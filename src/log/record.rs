@@ -12,7 +12,7 @@ const OLD: u8 = 254;
 /// Code of a sensor without a reading.
 const NEVER: u8 = 255;
 
-/// A tick's input and output in 88 bytes. Plan, request and log entries are rare and have frames
+/// A tick's input and output in 92 bytes. Plan, request and log entries are rare and have frames
 /// of their own; flags show that there were some.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Record {

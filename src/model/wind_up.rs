@@ -164,8 +164,7 @@ impl Shear {
         // what is left is of the second order in the travel of a relaxation over half the patch.
         let passes = divide(pull.rolled, pull.patch.max(pull.rolled));
         let renewed = passes * divide(passes, relaxes.max(Q16::DELTA)).min(Ratio::ONE);
-        let all = Ratio::ONE + relaxes + renewed;
-        state.sunk = divide(relaxes * pull.floor + state.sunk, all);
+        state.sunk = divide(relaxes * pull.floor + state.sunk, Ratio::ONE + relaxes + renewed);
     }
 }
 

@@ -15,6 +15,8 @@ macro_rules! quantities {
         $then! { $($given)*
             /// Estimated axial position of the wheel centre, mm.
             position: Millimetres, position_mm: f64, "odometry";
+            /// One sigma of it, mm; none, in the log 32767, while no landmark bears it out.
+            position_sigma: Millimetres, position_sigma_mm: Option<f64>, "odometry";
             /// Estimated speed of the wheel, mm/s.
             speed: MillimetresPerSecond, wheel_speed_mm_s: f64, "sensing", "speed" "estimated";
             /// Speed reference, asked for by the profile, mm/s.
