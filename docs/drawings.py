@@ -350,7 +350,7 @@ def data():
     d.arrow((630, 119), (710, 119))
     d.arrow((500, 174), (500, 226))
     d.arrow((630, 281), (710, 281))
-    d.text(824, 388, "RTT up 1: 37 kB/s, 4 KiB; never waits for a reader", color=BLUE, anchor="end")
+    d.text(824, 388, "RTT up 1: 46 kB/s, 4 KiB; never waits for a reader", color=BLUE, anchor="end")
     d.area((10, 408), (990, 408), (990, 790), (10, 790), fill="#f2eefa")
     d.text(26, 440, "host", color=SOFT)
     d.arrow((840, 336), (840, 452), color=BLUE, width=4)

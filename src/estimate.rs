@@ -4,7 +4,6 @@
 #![deny(clippy::float_arithmetic)]
 
 mod close;
-mod creep;
 pub mod crossing;
 mod crossing_speed;
 mod follow;
@@ -19,13 +18,14 @@ mod state;
 mod steps;
 pub mod tread;
 pub mod vibration;
+mod wind_up;
 
 use crate::model::corner_profile::CornerProfile;
 use crate::numeric::{LowPass, checked};
 use crate::rig::{Rig, RigError};
-use creep::Creep;
 use crossing::CrossingWatch;
 use tread::Tread;
+use wind_up::Pulls;
 
 pub use follow::Follow;
 pub use position::{Place, Position, PositionConfidence};
@@ -69,7 +69,7 @@ pub struct Estimator {
     rolling_lag: Ratio,
     /// The same of a wheel in the middle of its life.
     worn: Ratio,
-    creep: Creep,
+    pulls: Pulls,
 }
 
 impl Estimator {
@@ -95,7 +95,7 @@ impl Estimator {
                 "rig.wheel_wear_mm",
                 0.5 * rig.rig.wheel_wear_mm / rig.rig.wheel_radius_mm,
             )?,
-            creep: Creep::try_build(rig)?,
+            pulls: Pulls::try_build(rig)?,
         })
     }
 

@@ -1,6 +1,31 @@
 //! Latched faults (codes 100 to 199) and active limits (200 to 299). Codes are stable: no number
 //! gets a second meaning. Cause, detection, reaction and reset of each: `docs/MODES.md`.
 
+/// Declares an enum: each variant has its words, which the method of this name gives.
+macro_rules! worded {
+    ($(#[$meta:meta])* $name:ident, $words:ident:
+        $($(#[$of:meta])* $variant:ident $text:literal;)*) => {
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+        $(#[$meta])*
+        pub enum $name {
+            $($(#[$of])* #[doc = concat!("In words: ", $text, ".")] $variant,)*
+        }
+
+        impl $name {
+            /// Every one.
+            pub const ALL: [Self; [$($text),*].len()] = [$(Self::$variant),*];
+
+            /// In words.
+            pub const fn $words(self) -> &'static str {
+                match self {
+                    $(Self::$variant => $text,)*
+                }
+            }
+        }
+    };
+}
+pub(crate) use worded;
+
 /// Declares codes: each has one line with its name, its number and its sentence for the operator.
 macro_rules! codes {
     ($(#[$doc:meta])* $name:ident: $($variant:ident = $code:literal, $sentence:literal;)*) => {

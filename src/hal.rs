@@ -99,8 +99,7 @@ pub trait Journal {
     /// Writes one entry without blocking; the transport counts what it has to drop.
     fn write(&mut self, entry: &Entry);
 
-    /// Writes a frame of the binary log completely or not at all, and returns which. Never
-    /// blocks.
+    /// Writes a frame of the log completely or not at all, and returns which. Never blocks.
     fn send(&mut self, _frame: &[u8]) -> bool {
         false
     }

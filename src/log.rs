@@ -18,6 +18,7 @@ mod record;
 mod recorder;
 
 use crc::{CRC_32_ISO_HDLC, Crc, Table};
+use serde::Deserialize;
 
 pub use crate::supervise::codes;
 pub use encoder::{FrameSink, LogEncoder, TICKS_PER_FRAME};
@@ -30,6 +31,11 @@ pub use recorder::SnapshotRecorder;
 pub fn crc32(bytes: &[u8]) -> u32 {
     static CRC: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC);
     CRC.checksum(bytes)
+}
+
+/// The value of which these bytes are the postcard, all of them.
+pub(crate) fn complete<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Option<T> {
+    postcard::take_from_bytes(bytes).ok().and_then(|(value, rest)| rest.is_empty().then_some(value))
 }
 
 #[cfg(test)]

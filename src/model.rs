@@ -10,6 +10,7 @@ pub mod profile;
 pub mod rollout;
 pub mod timing;
 pub mod tread;
+pub mod wind_up;
 
 pub use approach::Approach;
 pub use plan::{Learned, LimitedBy, Outcome, Plan, PlanRequest, Review, Strategy};

@@ -7,6 +7,7 @@
 
 mod abilities;
 mod presets;
+pub mod shear;
 mod validate;
 
 pub use abilities::OVERPRESSURE_PART;
@@ -88,6 +89,9 @@ pub struct Tread {
     pub stiffening: f64,
     /// Relaxation time tau, s.
     pub tau_s: f64,
+    /// Thickness of the rubber, mm, by which it gives way along the wall. Chosen: 8, as it is not
+    /// published; a layer so thick has the gaps nearest to those of independent elements.
+    pub thickness_mm: f64,
 }
 
 /// Loads and friction.
@@ -111,9 +115,6 @@ pub struct Loads {
     /// the wheel into the wall; -1: leading arm, thrust lifts it; 0: parallel guide.
     /// Chosen: 1.
     pub arm_coupling: f64,
-    /// Creepage at which the tread transmits 63 % of its friction, dimensionless.
-    /// Chosen: 0.01, typical of solid rubber tyres.
-    pub elastic_creep: f64,
 }
 
 /// Pre-tightener: motor, screw and spring.
@@ -194,8 +195,7 @@ pub struct Sensors {
 #[cfg_attr(not(target_os = "none"), derive(documented::DocumentedFields))]
 #[serde(deny_unknown_fields)]
 pub struct ControlSettings {
-    /// Gap to hold at a step, mm; 0 takes the gap at `safe_speed_mm_s` and cruise
-    /// preload.
+    /// Gap to hold at a step, mm; 0 takes that at `safe_speed_mm_s` and cruise preload.
     pub gap_ref_mm: f64,
     /// Speed of the paper's safe point, mm/s. Published: 5.
     pub safe_speed_mm_s: f64,

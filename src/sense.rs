@@ -28,4 +28,4 @@ mod senses;
 pub mod speed;
 
 pub use freshness::{Reading, Reason, Validity};
-pub use senses::{FILTER_LAG, SensedState, Senses, SensesState, Tuning, Zeros};
+pub use senses::{FILTER_LAG, FILTER_S, SensedState, Senses, SensesState, Zeros};

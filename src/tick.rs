@@ -166,7 +166,9 @@ impl Controller {
         output.rearm = false;
         output.events.clear();
         let acceleration = state.acceleration();
-        let sensed = self.senses.step(&mut state.senses, input.now, &input.sensors, acceleration);
+        let mut sensed =
+            self.senses.step(&mut state.senses, input.now, &input.sensors, acceleration);
+        state.estimate.rim(&mut sensed, matches!(state.mode, Mode::Run(..)));
         self.estimator.begin_tick(&mut state.estimate, &sensed);
         let arm_thrust = self.arm_coupling * self.load_of(state) * sensed.tan_arm;
         let tick =
@@ -197,6 +199,8 @@ impl Controller {
             now: tick.now,
             mode: state.mode,
             sensed: tick.sensed,
+            travel: state.estimate.driven(tick.sensed),
+            wound: state.estimate.wound(),
             bridges: input.sensors.bridges,
             speed_ref: state.signed_speed(),
             preload_due: state.preload_loop.due(),
@@ -228,24 +232,26 @@ impl Controller {
         }
     }
 
-    /// Follows steps and corners while the drive moves.
+    /// Follows steps and corners while the drive moves, and an axle that sinks on its tread.
     fn follow_contact(&self, state: &mut State, tick: &mut TickContext<'_>) {
-        if !state.mode.moves() {
-            return;
-        }
         let plan = state.planning.plan.as_ref();
         let most = plan.map_or(Q16::MAX, |plan| plan.most_preload);
         let follow = Follow {
             now: tick.now,
             sensed: tick.sensed,
             pressed: tick.pressed(),
+            load: self.load_of(state),
             duty: state.speed_loop.duty(),
             most_pressed: most - tick.sensed.preload_filtered <= self.schedule.reached_within,
             standing_since: state.approach.standing_since,
             limited_by: plan.map(|plan| plan.limited_by),
         };
-        let found = self.estimator.follow(&mut state.estimate, &follow);
-        self.take_findings(state, tick, found);
+        if state.mode.moves() {
+            let found = self.estimator.follow(&mut state.estimate, &follow);
+            self.take_findings(state, tick, found);
+        } else if state.mode != Mode::Service {
+            self.estimator.sink(&mut state.estimate, &follow);
+        }
     }
 }
 

@@ -37,6 +37,8 @@ pub struct RunLine {
     pub later_gap_over_ref: Option<f64>,
     /// Distance from the commanded end, mm, of a run that the controller calls complete.
     pub end_off_mm: Option<f64>,
+    /// The same over the one sigma that the controller states of its position there.
+    pub end_off_sigmas: Option<f64>,
     /// Steps that were found: number, and distance of the face on record from the true one, mm.
     pub found_off_mm: Vec<(u8, f64)>,
     /// Whether it ended short of the end and nothing reports it.
@@ -80,13 +82,15 @@ impl RunLine {
         let reported =
             !summary.faults.is_empty() || limits.iter().any(|code| REPORT_END.contains(code));
         let called_complete = summary.faults.is_empty() && summary.cut_off_s.is_none();
+        let end_off_mm = called_complete.then(|| (summary.travel_mm - travel_mm).abs());
         let found = |c: &CrossingLine| Some((c.index, (c.step_found_mm? - c.step_mm).abs()));
         Self {
             seed: summary.seed,
             completed,
             first_gap_over_ref: gaps().next().filter(|_| referred),
             later_gap_over_ref: gaps().skip(1).max_by(f64::total_cmp).filter(|_| referred),
-            end_off_mm: called_complete.then(|| (summary.travel_mm - travel_mm).abs()),
+            end_off_sigmas: end_off_mm.zip(summary.position_sigma_mm).map(|(off, one)| off / one),
+            end_off_mm,
             found_off_mm: crossings.iter().filter_map(found).collect(),
             silent: !completed && !reported,
             stopped_sound: !summary.faults.is_empty()

@@ -207,7 +207,7 @@ impl Replay {
         }
         if again.flags != row.flags() {
             let bits = |bits: u16| format!("{bits:#018b}");
-            let (flags, again) = (bits(row.flags), bits(again.flags.to_bits()));
+            let (flags, again) = (bits(row.flags), bits(again.flags.0));
             return Some(differs("bridges, requests and entries", "flags", flags, again));
         }
         let asked = self.since.requests.iter().find(|(at, _)| *at == row.tick);

@@ -73,6 +73,7 @@ impl Wheel {
             axial: setup.load_n.map_or(Axial::Pushed, |load| Axial::Driven(Q16::from_num(load))),
             scale: Q16::ONE,
             level: true,
+            shear: None,
             from: Q16::from_num(from),
             until: Q16::from_num(until),
         }

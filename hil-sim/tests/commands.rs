@@ -4,10 +4,12 @@
 use crate::common::{
     Bench, DIRECTIONS, Moment, NO_SLIP_MM, RIGS, check_each, end_mm, opposite, scenario, starter,
 };
+use hil_sim::plant::wall::touch_mm;
 use hil_sim::scenario::{Direction, Scenario};
 use hil_sim::testing::long;
 use interstage::estimate::ContactStage as Stage;
 use interstage::fault::Fault;
+use interstage::rig::Rig;
 use interstage::sense::raw::SensorId;
 use interstage::supervise::{Command, Leg, Mode, Trigger, next};
 use interstage::tick::Event;
@@ -104,6 +106,15 @@ fn stopped(case: &Case) -> Bench {
     bench
 }
 
+/// How far an axle may sink on a wheel that stands, mm: rubber that carries all of a corner's force at
+/// its stiffness at once, and then relaxes.
+fn sinks_mm(scenario: &Scenario) -> f64 {
+    let Rig { rig, preload, plant, tread, .. } = &scenario.rig;
+    let sine = touch_mm(rig.wheel_radius_mm, rig.step_height_mm) / rig.wheel_radius_mm;
+    let force_n = preload.limit_n * sine + plant.top_load_n * plant.top_load_share;
+    force_n / scenario.rig.shear().n_per_mm * (1.0 - 1.0 / tread.stiffening)
+}
+
 #[test]
 fn a_stop_brings_the_drive_to_rest_and_keeps_the_preload() {
     check_each(sample(everywhere()), |case| {
@@ -112,20 +123,26 @@ fn a_stop_brings_the_drive_to_rest_and_keeps_the_preload() {
         bench.give(Command::Stop);
         assert!(matches!(bench.mode(), Mode::Stopping(_)), "{name}");
         let after = |what: &str| format!("{what} after {name}");
-        bench.until(&after("rest"), 0.3, |now| now.truth.speed_mm_s.abs() < 0.5);
+        bench.until(&after("rest"), 0.3, |now| now.truth.rigid_mm_s.abs() < 0.5);
         bench.until(&after("idle"), 0.1, |now| now.seen.mode == Mode::Idle);
         // The worm brakes the remaining speed.
         bench.until(&after("standstill"), 0.025, Moment::is_still);
-        let (at, pressed) = (bench.position_mm(), bench.now().truth.preload_n);
-        let from = bench.moments.len();
+        let (from, sinks_mm) = (bench.now().clone(), sinks_mm(&case.scenario));
+        let moments = bench.moments.len();
         bench.run_s(1.0);
-        for now in &bench.moments[from..] {
+        for now in &bench.moments[moments..] {
             assert!(now.is_off() && now.is_still(), "{name}");
-            assert_eq!(now.truth.position_mm, at, "{name}");
-            // The tread relaxes into the wall and takes some spring with it.
-            let kept = now.truth.preload_n / pressed;
-            assert!((0.985..1.001).contains(&kept), "{name}: {kept}");
+            let sunk = from.truth.position_mm - now.truth.position_mm;
+            assert!((-0.05..sinks_mm).contains(&sunk), "{name}: {sunk}");
+            // The tread relaxes into the wall, or sinks down the corner, and takes some spring with it.
+            let kept = now.truth.preload_n / from.truth.preload_n;
+            assert!((0.98..1.001).contains(&kept), "{name}: {kept}");
         }
+        let off = |now: &Moment| now.seen.position.to_num::<f64>() - now.truth.position_mm;
+        let lost = off(bench.now()) - off(&from);
+        // Off a corner the controller knows by how much; on it the edge shows the place when it goes on.
+        let on_wall = matches!(case.place, Place::Cruise | Place::Settle);
+        assert!(!on_wall || lost.abs() < 0.3, "{name}: {lost}");
         assert_eq!(bench.mode(), Mode::Idle, "{name}");
         assert!(bench.faults().is_empty(), "{name}");
     });
@@ -136,7 +153,9 @@ fn assert_arrived(bench: &Bench, scenario: &Scenario, direction: Direction, name
     let limit = scenario.rig.preload.limit_n;
     assert_eq!(bench.mode(), Mode::Complete(direction.into()), "{name}");
     let off = bench.position_mm() - end_mm(scenario, direction);
-    assert!(off.abs() < 0.5, "{name}: {off} mm from the end");
+    // At three times the load the tread gives way by three times as much.
+    let within = if scenario.preset == "fe" { 0.7 } else { 0.5 };
+    assert!(off.abs() < within, "{name}: {off} mm from the end");
     let level = if direction == Direction::Deploy { 3 } else { 0 };
     assert_eq!(bench.now().seen.level, level, "{name}");
     assert!(bench.step_codes().is_empty(), "{name}: {:?}", bench.step_codes());
@@ -211,7 +230,7 @@ fn assert_sound_records(bench: &Bench, scenario: &Scenario, name: &str) {
         let truth = bench.true_gap_mm(&record);
         // At the study's loads a wheel that is turned back on the corner just after touch-down
         // leaves the lower wall at 19 mm/s: 1.07.
-        let (most, off) = if name.starts_with("fe") { (1.08, 0.05) } else { (1.05, 0.03) };
+        let (most, off) = if name.starts_with("fe") { (1.08, 0.06) } else { (1.05, 0.03) };
         let part = truth.unwrap_or(measured) / gap_ref(scenario, record.direction);
         assert!((0.65..most).contains(&part), "{name}: {part} {record:?}");
         let error = measured / truth.unwrap_or(measured) - 1.0;
@@ -253,10 +272,11 @@ fn a_session_goes_out_back_and_out_again() {
             let off = |gap: f64| gap / crossing.gap_mm - 1.0;
             let measured = off(record.gap_measured.to_num());
             let predicted = off(record.gap_predicted.to_num());
-            assert!(measured.abs() < 0.03, "{rig} {crossing:?}: {measured}");
             // A tread that is pressed three times as deep remembers more than the last half
-            // millimetre, over which the speed of a crossing is taken.
-            let bound = if rig == "fe" { 0.06 } else { 0.05 };
+            // millimetre, over which the speed of a crossing is taken; three sigmas of a measured
+            // gap are 0.11 mm.
+            let (read, bound) = if rig == "fe" { (0.06, 0.06) } else { (0.03, 0.05) };
+            assert!(measured.abs() < read, "{rig} {crossing:?}: {measured}");
             assert!(predicted.abs() < bound, "{rig} {crossing:?}: {predicted}");
         }
     }
@@ -381,9 +401,8 @@ fn a_sensor_that_falls_silent_stops_everything_at_once() {
             let (moving, stopped) = bench.moments[from..].split_at(found);
             assert!(moving.iter().all(|now| now.drive.enable && now.preload.enable), "{name}");
             assert!(stopped.iter().all(Moment::is_off), "{name}");
-            let rests = stopped[20].truth.position_mm;
-            let moved = stopped[20..].iter().map(|now| (now.truth.position_mm - rests).abs());
-            assert!(moved.fold(0.0, f64::max) < 1e-3, "{name}");
+            let moved = stopped[20..].iter().map(|now| now.truth.rigid_mm_s.abs() * 1e-3);
+            assert!(moved.sum::<f64>() < 0.02, "{name}");
             assert!(stopped[60].is_still(), "{name}");
             let pressed = stopped[0].truth.preload_n;
             let kept = stopped.iter().map(|now| now.truth.preload_n / pressed);

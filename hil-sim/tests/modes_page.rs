@@ -40,14 +40,14 @@ fn edges() -> BTreeMap<(String, String), Vec<String>> {
     let mut edges: BTreeMap<(String, String), Vec<String>> = BTreeMap::new();
     // One hold stands for all.
     let hold = Mode::FaultHold(Fault::SelfTest);
-    for mode in Mode::WITHOUT_FAULT.into_iter().chain([hold]) {
-        for trigger in Trigger::WITHOUT_FAULT {
+    for mode in Mode::WITHOUT_FAULT.map(|(mode, _)| mode).into_iter().chain([hold]) {
+        for (trigger, label) in LABELS {
             let Some(after) = next(mode, trigger) else { continue };
             let ends = (name(mode), name(after));
             if ends.0 == ends.1 && !matches!(mode, Mode::Run(..)) {
                 continue;
             }
-            let label = label(trigger);
+            let label = label.to_owned();
             let labels = edges.entry(ends).or_default();
             if !labels.contains(&label) {
                 labels.push(label);
@@ -73,24 +73,22 @@ fn name(mode: Mode) -> String {
     }
 }
 
-fn label(trigger: Trigger) -> String {
-    match trigger {
-        Trigger::SensorsAnswer => "sensors answer".into(),
-        Trigger::TestPassed { stowed: true } => "passed, stowed".into(),
-        Trigger::TestPassed { stowed: false } => "passed, elsewhere".into(),
-        Trigger::Zeroed => "zeros taken".into(),
-        Trigger::Command(Command::Start) => "start".into(),
-        Trigger::Command(Command::Stop) => "stop".into(),
-        Trigger::Command(Command::Retract) => "retract".into(),
-        Trigger::Command(Command::Reset) => "reset".into(),
-        Trigger::PreloadReached => "preload reached".into(),
-        Trigger::Leg(Leg::Cruise) => "cruise".into(),
-        Trigger::Leg(Leg::Approach) => "approach".into(),
-        Trigger::Leg(Leg::Crossing) => "crossing".into(),
-        Trigger::Leg(Leg::Settle) => "settle".into(),
-        Trigger::AtRest => "at rest".into(),
-        Trigger::Arrived => "arrived".into(),
-        Trigger::Service => "host on the line".into(),
-        Trigger::Fault(fault) => format!("fault {}", fault.code()),
-    }
-}
+/// Every trigger but the faults, and its label.
+const LABELS: [(Trigger, &str); 16] = [
+    (Trigger::SensorsAnswer, "sensors answer"),
+    (Trigger::TestPassed { stowed: true }, "passed, stowed"),
+    (Trigger::TestPassed { stowed: false }, "passed, elsewhere"),
+    (Trigger::Zeroed, "zeros taken"),
+    (Trigger::Command(Command::Start), "start"),
+    (Trigger::Command(Command::Stop), "stop"),
+    (Trigger::Command(Command::Retract), "retract"),
+    (Trigger::Command(Command::Reset), "reset"),
+    (Trigger::PreloadReached, "preload reached"),
+    (Trigger::Leg(Leg::Cruise), "cruise"),
+    (Trigger::Leg(Leg::Approach), "approach"),
+    (Trigger::Leg(Leg::Crossing), "crossing"),
+    (Trigger::Leg(Leg::Settle), "settle"),
+    (Trigger::AtRest, "at rest"),
+    (Trigger::Arrived, "arrived"),
+    (Trigger::Service, "host on the line"),
+];

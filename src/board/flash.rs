@@ -6,7 +6,8 @@
 use embassy_stm32::Peri;
 use embassy_stm32::flash::{Async, Flash};
 use embassy_stm32::peripherals::FLASH;
-use interstage::params::slots::{FlashFault, PAGE_BYTES, SLOT_BYTES, SetMemory, Slot, WORD_BYTES};
+use interstage::params::Refusal;
+use interstage::params::slots::{PAGE_BYTES, SLOT_BYTES, SetMemory, Slot, WORD_BYTES};
 
 use super::{Irqs, safety};
 
@@ -50,9 +51,9 @@ impl SetMemory for ParameterFlash {
         safety::unreadable() == before
     }
 
-    async fn erase(&mut self, slot: Slot, page: usize) -> Result<(), FlashFault> {
+    async fn erase(&mut self, slot: Slot, page: usize) -> Result<(), Refusal> {
         let from = (offset_of(slot) + page * PAGE_BYTES) as u32;
-        self.0.erase(from, from + PAGE_BYTES as u32).await.map_err(|_| FlashFault)
+        self.0.erase(from, from + PAGE_BYTES as u32).await.map_err(|_| Refusal::Flash)
     }
 
     async fn program(
@@ -60,8 +61,8 @@ impl SetMemory for ParameterFlash {
         slot: Slot,
         offset: usize,
         word: [u8; WORD_BYTES],
-    ) -> Result<(), FlashFault> {
+    ) -> Result<(), Refusal> {
         let at = (offset_of(slot) + offset) as u32;
-        self.0.write(at, &word).await.map_err(|_| FlashFault)
+        self.0.write(at, &word).await.map_err(|_| Refusal::Flash)
     }
 }

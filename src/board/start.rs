@@ -33,17 +33,13 @@ pub(crate) fn report(waited: bool) -> Restart {
 fn reset() -> Reset {
     let flags = RCC.csr().read();
     // Every internal reset pulls the pin too; a supply that comes up sets the brown-out flag.
-    if flags.iwdgrstf() {
-        Reset::Watchdog
-    } else if flags.borrstf() {
-        Reset::Power
-    } else if flags.sftrstf() {
-        Reset::Software
-    } else if flags.pinrstf() {
-        Reset::Pin
-    } else {
-        Reset::Other
-    }
+    let causes = [
+        (flags.iwdgrstf(), Reset::Watchdog),
+        (flags.borrstf(), Reset::Power),
+        (flags.sftrstf(), Reset::Software),
+        (flags.pinrstf(), Reset::Pin),
+    ];
+    causes.into_iter().find(|(set, _)| *set).map_or(Reset::Other, |(_, cause)| cause)
 }
 
 /// Logs it; a plain power-up is not worth an error.

@@ -3,6 +3,7 @@
 use super::landing::Landing;
 use super::{EstimateState, Estimator, Findings, OpenCrossing, Position, Slip};
 use crate::fault::{Fault, Limit};
+use crate::numeric::sqrt;
 use crate::sense::SensedState;
 use crate::units::{Direction, Millimetres, Q16, q16};
 
@@ -10,16 +11,12 @@ use crate::units::{Direction, Millimetres, Q16, q16};
 /// the tolerance of a sleeve, 0.05.
 const HEIGHT_SEEN: Millimetres = q16(120_000);
 
-/// Largest slide at a landing that may go unseen, mm: the least that counts, and its sigma.
-const UNSEEN: Millimetres = q16(515_000);
-/// What a step that was made with care is off by at most, mm.
-const MACHINED: Millimetres = q16(300_000);
-
 impl Estimator {
-    /// Largest residual of a step that is where the table has it, mm: its tolerance, and three
-    /// sigma of the position.
+    /// Largest residual of a step that is where the table has it, mm: its tolerance and three sigma of
+    /// the position, which are independent.
     pub(super) fn tolerated(&self, state: &EstimateState) -> Millimetres {
-        self.steps.tolerance() + self.sigma(state) * q16(3_000_000)
+        let (tolerance, off) = (self.steps.tolerance(), self.sigma(state) * q16(3_000_000));
+        sqrt(tolerance * tolerance + off * off)
     }
 
     /// Whether a step is off by no more than is tolerated, or by as much as the one before it.
@@ -58,12 +55,8 @@ impl Estimator {
             found.fault.get_or_insert(Fault::StepsDisagree);
             residual
         } else {
-            // One alone: the step is displaced, or as likely slides that went unseen have added up.
-            let unseen = UNSEEN * Q16::from_num(self.steps.count().saturating_sub(step)) + MACHINED;
-            let outwards = state.direction == Direction::Retract && residual > Q16::ZERO;
-            if outwards && residual <= unseen {
-                state.odometry.slip(Q16::ZERO, residual.half());
-            }
+            // One alone: the step is displaced, or as likely the wheel.
+            state.odometry.slip(Q16::ZERO, residual.half());
             state.displaced = Some((step, residual));
             report_displaced(state, residual, found);
             residual
@@ -127,6 +120,10 @@ impl Estimator {
                 if let Some(landing) = landing.filter(|landing| landing.slid > Q16::ZERO) {
                     state.odometry.slip(Q16::ZERO, landing.sigma());
                 }
+                if higher.abs() > HEIGHT_SEEN {
+                    // The height moves the face, and is read on a wall that is not there.
+                    state.odometry.slip(Q16::ZERO, shift);
+                }
                 point.face += left;
                 point.residual += left;
                 state.begin_tick(sensed.travel);
@@ -178,7 +175,7 @@ pub(super) struct Measured {
 
 /// Slip of a crossing so far, if any.
 pub(super) fn slip_of(open: &OpenCrossing, position: Millimetres) -> Option<Slip> {
-    let amount = open.slip.lost;
+    let amount = open.slip.lost + open.slip.beside;
     let sigma = open.landing.map_or(open.slip.sigma(), |landing| landing.sigma());
     (amount > Q16::ZERO).then_some(Slip { position, amount, sigma })
 }

@@ -14,7 +14,7 @@ mod measure;
 
 use self::measure::is_clear;
 use crate::numeric::{LowPass, LowPassState, between, sqrt};
-use crate::units::{Direction, Millimetres, Q16, Ratio, Travel, q16};
+use crate::units::{Direction, Millimetres, Q16, Travel, q16};
 
 /// Rise above which the baseline is held, mm: two steps of the angle code.
 const HOLD: Millimetres = q16(80_000);
@@ -58,10 +58,6 @@ pub struct CrossingWatch {
     step: Millimetres,
     /// Baseline of the outermost wall by the table, mm.
     outermost: Millimetres,
-    /// Part of the compression before a step that the tread still has when the lower
-    /// wall stops carrying, and the most that it still has, over the half width of the patch.
-    memory: Ratio,
-    most_kept: Ratio,
     baseline: LowPass,
     settle: LowPass,
 }
@@ -173,6 +169,8 @@ pub struct WatchInput {
     pub over: bool,
     /// The wheel is clear of the step behind; none where only the ground can show that.
     pub clear: Option<bool>,
+    /// Compression by the lower wall at which the tread's memory lets go of it, mm.
+    pub short: Millimetres,
 }
 
 impl CrossingWatch {
@@ -319,6 +317,30 @@ impl CrossingWatch {
         }
     }
 
+    /// Whether a retracting wheel may be over an edge by so much, mm: it sinks by `x^2 / 2 R`, or half of
+    /// that.
+    pub fn may_be_over(&self, state: &WatchState, seen: &WatchInput, over: Millimetres) -> bool {
+        let sunk = self.rise(state, Direction::Retract, seen) + TOUCH;
+        over * over < sunk * self.radius * q16(4_000_000)
+    }
+
+    /// Whether the wheel is on a wall, far from any edge.
+    pub fn is_level(&self, state: &WatchState, direction: Direction, seen: &WatchInput) -> bool {
+        state.contact == Contact::Wall && self.rise(state, direction, seen).abs() < HOLD
+    }
+
+    /// Compression by the wall, or beside a corner by the lower one, mm.
+    pub fn floor(
+        &self,
+        state: &WatchState,
+        direction: Direction,
+        seen: &WatchInput,
+    ) -> Millimetres {
+        let dropped = direction == Direction::Retract && state.contact != Contact::Wall;
+        let wall = state.baseline.output() + if dropped { self.step } else { Q16::ZERO };
+        (seen.radius - wall).max(Q16::ZERO)
+    }
+
     /// One tick.
     pub fn step(&self, state: &mut WatchState, direction: Direction, seen: &WatchInput) -> Noticed {
         let risen = (direction, seen, self.rise(state, direction, seen));
@@ -363,10 +385,7 @@ impl CrossingWatch {
     fn on_corner(&self, state: &mut WatchState, (direction, seen, rise): Risen<'_>) -> Noticed {
         // Height of the centre that the tread's memory still lacks at this instant.
         let short = match direction {
-            Direction::Deploy => {
-                let flat = state.flat.max(Q16::ZERO);
-                (flat * self.memory).min(sqrt(flat * (self.radius + self.radius)) * self.most_kept)
-            }
+            Direction::Deploy => seen.short,
             Direction::Retract => Q16::ZERO,
         };
         let free = match direction {

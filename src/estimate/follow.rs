@@ -5,6 +5,7 @@ use super::crossing::{Contact, CrossingEvent, Lift, WatchInput};
 use super::landing::OnEdge;
 use super::odometry::Rolling;
 use super::tread::Rolls;
+use super::wind_up::Pulled;
 use super::{EstimateState, Estimator, Expectation, Findings, LiftPoint, OpenCrossing, Position};
 use crate::fault::{Fault, Limit};
 use crate::model::LimitedBy;
@@ -24,6 +25,8 @@ pub struct Follow<'a> {
     pub sensed: &'a SensedState,
     /// Radial force on the wheel, N.
     pub pressed: Newtons,
+    /// Axial load on it, N, inwards.
+    pub load: Newtons,
     /// Duty of the drive in the last tick.
     pub duty: Ratio,
     /// The preload is as high as it may be.
@@ -54,21 +57,19 @@ impl Estimator {
     pub fn follow(&self, state: &mut EstimateState, tick: &Follow<'_>) -> Findings {
         let mut found = Findings::default();
         let direction = state.direction;
-        state.history.step(self.stride, direction, tick.sensed.travel, tick.pressed);
+        state.history.step(self.stride, direction, state.turns(tick.sensed).0, tick.pressed);
         self.watch_slip(state, tick, &mut found);
         let seen = self.watch_input(state, tick.sensed);
         let event = self.watch.step(&mut state.watch, direction, &seen);
         let on_corner = state.on_corner();
-        let creep = self.creep.outwards(tick.pressed);
         let rolling = Rolling {
             radius: tick.sensed.radius.value,
-            lag: self.worn
-                + self.rolling_lag * tick.sensed.compression_filtered
-                + creep * Q16::from_num(direction.sign()),
+            lag: self.worn + self.rolling_lag * tick.sensed.compression_filtered,
             on_corner,
         };
         state.odometry.roll(tick.sensed.travel, &rolling, event.is_some());
         state.begin_tick(tick.sensed.travel);
+        self.sink(state, tick);
         if let Some(open) = state.crossing.as_mut() {
             open.peak_preload = open.peak_preload.max(tick.sensed.preload_filtered);
         }
@@ -90,12 +91,66 @@ impl Estimator {
         self.feel(state, tick.sensed);
         self.hold_to_corner(state, tick);
         if state.watch.contact == Contact::Wall || state.known.is_searching() {
-            let (travel, compression) = (tick.sensed.travel, tick.sensed.compression_filtered);
-            let (speed, duty, pressed) = (tick.sensed.speed.value, tick.duty, tick.pressed);
+            let (travel, speed) = state.turns(tick.sensed);
+            let (duty, pressed) = (tick.duty, tick.pressed);
+            let compression = tick.sensed.compression_filtered;
             let rolls = Rolls { direction, travel, speed, duty, pressed, compression };
             found.shown = self.tread.roll(&mut state.tread, &rolls);
         }
         found
+    }
+
+    /// The tread gives way to what pulls at it, once a run has shown that; beside a wheel that stands
+    /// the axle sinks.
+    pub fn sink(&self, state: &mut EstimateState, tick: &Follow<'_>) {
+        if state.wind_up.is_known() {
+            let pulled = self.pulled(state, tick);
+            let (wind_up, odometry) = (&mut state.wind_up, &mut state.odometry);
+            self.pulls.step(wind_up, odometry, tick.sensed.travel, &pulled);
+        }
+    }
+
+    /// What pulls at the tread, and where.
+    fn pulled(&self, state: &EstimateState, tick: &Follow<'_>) -> Pulled {
+        let seen = self.watch_input(state, tick.sensed);
+        let ahead = match &state.crossing {
+            Some(open) => {
+                let face = open.lift.map(|point| point.face).or(open.felt);
+                face.or(self.steps.face(open.step)).map(|face| face - state.position)
+            }
+            // A wheel that goes over an edge is on it before that shows.
+            None if state.direction == Direction::Retract && !state.known.is_searching() => {
+                let over = self.distance(state).map(|distance| -distance);
+                over.filter(|over| self.watch.may_be_over(&state.watch, &seen, *over))
+            }
+            None => None,
+        };
+        let ahead = ahead.unwrap_or_default().max(Q16::ZERO);
+        let off = state.watch.contact == Contact::Wall && ahead > Q16::ZERO;
+        // Too far for an edge, on a step that is not as high as the table has it.
+        let on_corner = matches!(state.watch.contact, Contact::Both | Contact::Corner);
+        let most = self.corner().first_contact(Direction::Deploy);
+        let beyond = ahead > most && !on_corner;
+        let ahead = if beyond { Q16::ZERO } else { ahead.min(most) };
+        let over = state.watch.contact == Contact::Leaving && ahead == Q16::ZERO;
+        let floor = if off {
+            Q16::ZERO
+        } else if beyond || over {
+            seen.compression
+        } else {
+            self.watch.floor(&state.watch, state.direction, &seen)
+        };
+        // Half of a patch hangs over an edge that is nearer.
+        let reach = self.corner().first_contact(state.direction);
+        let far = self.distance(state).is_none_or(|distance| distance > reach);
+        Pulled {
+            pressed: tick.pressed,
+            load: tick.load,
+            depth: seen.compression,
+            ahead,
+            floor,
+            level: far && self.watch.is_level(&state.watch, state.direction, &seen),
+        }
     }
 
     /// Where the step is, from the moment at which its corner carries.
@@ -129,6 +184,8 @@ impl Estimator {
             }
             Expectation::Missing => {
                 found.limit(Limit::StepMissing);
+                // Or is it there, and the wheel elsewhere?
+                state.odometry.slip(Q16::ZERO, self.steps.tolerance());
                 state.missed_in_a_row = state.missed_in_a_row.saturating_add(1);
                 state.missed = match state.direction {
                     Direction::Deploy => state.missed.saturating_add(1),
@@ -186,7 +243,8 @@ impl Estimator {
             state.on_corner()
         };
         if begin || on_edge {
-            self.tread.begin(&mut state.tread, sensed.travel, preload, compression);
+            let (travel, _) = state.turns(sensed);
+            self.tread.begin(&mut state.tread, travel, preload, compression);
             return false;
         }
         self.tread.rest(&mut state.tread, preload, arm_thrust, compression)
@@ -194,6 +252,8 @@ impl Estimator {
     }
 
     fn touched(&self, state: &mut EstimateState, tick: &Follow<'_>, found: &mut Findings) {
+        // Behind a corner the effort is another one.
+        state.tread.rises = false;
         let distance = self.distance(state);
         let expectation = self.steps.expectation(state.direction, distance);
         let searching = state.known.is_searching() && state.next_step > 0;
@@ -263,11 +323,30 @@ impl Estimator {
         } + seen.compression;
         let lag = (sensed.speed.value * FILTER_LAG).widen();
         let travel = sensed.travel.saturating_sub(lag);
-        let at = OnEdge { travel, position, fall, depth: seen.compression };
+        let gave = state.odometry.gave();
+        let at = OnEdge { travel, position, fall, depth: seen.compression, gave };
         let on_floor = state.watch.contact == Contact::Both;
         // Of a crossing that began in its middle the wall below was not measured.
-        let told = |open: &&mut OpenCrossing| !open.turned && ahead.abs() > self.telling;
-        let Some(open) = state.crossing.as_mut().filter(told) else { return };
+        let Some(open) = state.crossing.as_mut().filter(|open| !open.turned) else { return };
+        if ahead.abs() <= self.telling {
+            let lift = open.lift.filter(|_| open.corrected);
+            let climbs = lift.filter(|_| state.direction == Direction::Deploy);
+            if let Some(lift) = climbs.filter(|_| !core::mem::replace(&mut open.climbed, true)) {
+                let moved = position + ahead - lift.face;
+                if open.searched {
+                    // The wheel may have begun on this corner, and lifted off elsewhere.
+                    state.odometry.set_by_step(sensed.travel, state.position - moved);
+                } else if open.slip.lost > moved.abs() {
+                    // More slip than creep: what the wheel slipped in all.
+                    open.slip.beside = moved;
+                    state.odometry.slip(moved, Q16::ZERO);
+                } else {
+                    state.odometry.climb(state.position, moved);
+                }
+                state.begin_tick(sensed.travel);
+            }
+            return;
+        }
         let radius = self.watch.radius();
         let lost = match state.direction {
             Direction::Deploy => open.slip.step(radius, &at, on_floor),
@@ -310,6 +389,7 @@ impl Estimator {
             state.odometry.set_by_step(sensed.travel, state.position - residual);
             state.known = Position::Located;
             (residual, open.corrected) = (Q16::ZERO, true);
+            open.searched = true;
         } else if corrects && !retracts && self.is_explained(state, open.step, residual) {
             residual = self.correct(state, sensed, (open.step, residual), found);
             open.corrected = true;
@@ -349,6 +429,7 @@ impl Estimator {
             near: to_window.is_some_and(|ahead| ahead <= Q16::ZERO) && !state.known.is_searching(),
             over: self.is_over(state),
             clear: self.clear_of(state, sensed),
+            short: self.pulls.short(&state.wind_up),
         }
     }
 

@@ -20,6 +20,9 @@ const MOVES: Ratio = q16(250_000);
 const SHOWN: Millimetres = q16(90_000);
 /// Least slide in all, mm: two sigma of what it is off by, with the reading's own.
 const SLID: Millimetres = q16(300_000);
+/// Part by which the tread may give way otherwise than by its model, one sigma: of rubber from 4 to
+/// 16 mm thick that is told as 8.
+pub(super) const GIVES_OTHERWISE: Ratio = q16(600_000);
 /// Distance by which the face has moved inwards once the wheel has landed, mm.
 const LANDED: Millimetres = q16(200_000);
 /// Part that the largest compression has in the slide; the rest has the compression as read. A tread
@@ -45,6 +48,8 @@ pub struct OnEdge {
     pub fall: Millimetres,
     /// Compression, mm.
     pub depth: Millimetres,
+    /// What the tread has given way by outwards so far, by its model, mm.
+    pub gave: Millimetres,
 }
 
 impl OnEdge {
@@ -84,17 +89,25 @@ struct Face {
     travelled: Millimetres,
     /// Its position by the compression as read, mm.
     position: Millimetres,
+    /// What the tread has given way by, mm.
+    gave: Millimetres,
 }
 
 impl Face {
     /// Least where a slide begins: before it the travel, in it the face moves this on.
     fn begin(&self) -> Millimetres {
-        self.as_read - self.travelled * MOVES
+        self.as_read
+            - self.travelled * MOVES
+            - self.gave * GIVES_OTHERWISE
+            - self.gave * GIVES_OTHERWISE
     }
 
     /// Grows in a slide alone, by as much as the wheel slides.
     fn beyond(&self) -> Millimetres {
-        self.as_read - self.travelled * ROLLS
+        self.as_read
+            - self.travelled * ROLLS
+            - self.gave * GIVES_OTHERWISE
+            - self.gave * GIVES_OTHERWISE
     }
 
     /// Largest where the wheel lands.
@@ -110,6 +123,9 @@ pub struct Slide {
     travelled: Millimetres,
     /// Largest compression, mm.
     deepest: Millimetres,
+    /// What the tread has given way by, and all that it has so far, out and back, mm.
+    given: Option<Millimetres>,
+    gave: Millimetres,
     begin: Option<Face>,
     /// Begin and end of the slide, if the wheel landed at the end.
     found: Option<(Face, Face)>,
@@ -131,11 +147,14 @@ impl Slide {
         let turned = self.travel.map_or(Travel::ZERO, |travel| travel.saturating_sub(at.travel));
         self.travelled += Q16::narrow(turned) * divide(over, radius - at.depth).min(Ratio::ONE);
         self.travel = Some(at.travel);
+        let given = self.given.replace(at.gave).unwrap_or(at.gave);
+        self.gave += (at.gave - given).abs();
         let face = Face {
             by_largest: edge(self.deepest) - self.travelled,
             as_read: edge(at.depth) - self.travelled,
             travelled: self.travelled,
             position: at.position + edge(at.depth),
+            gave: self.gave,
         };
         let least = self.least.map_or(face.beyond(), |least| least.min(face.beyond()));
         self.least = Some(least);
@@ -204,6 +223,7 @@ mod tests {
             let moved = if sliding { 0.01 * (1.0 + rate) } else { 0.01 };
             let jitter = noise * f64::from(tick * 7919 % 101 - 50) / 50.0;
             let at = OnEdge {
+                gave: Q16::ZERO,
                 travel: Travel::from_num(-tread),
                 position: Q16::from_num(18.0 - 6.3 - tread),
                 fall: Q16::from_num(fall + jitter),
@@ -234,6 +254,7 @@ mod tests {
             let fall = R - (reach * reach - past * past).sqrt();
             let off = if tick == 1000 { 0.4 } else { 0.0 };
             let at = OnEdge {
+                gave: Q16::ZERO,
                 travel: Travel::from_num(-rolled),
                 position: Q16::from_num(18.0 - 6.3 - rolled),
                 fall: Q16::from_num(fall - off),
@@ -258,6 +279,7 @@ mod tests {
             let jitter = noise * f64::from(tick * 7919 % 101 - 50) / 50.0;
             let depth = R - past.hypot(R - fall);
             let at = OnEdge {
+                gave: Q16::ZERO,
                 travel: Travel::from_num(-tread),
                 position: Q16::from_num(18.0 - 6.3 - tread),
                 fall: Q16::from_num(fall),

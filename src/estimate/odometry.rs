@@ -19,11 +19,18 @@ const WANDERS: Ratio = q16(30_000);
 const UNKNOWN_RADIUS: Ratio = q16(250_000);
 /// Reciprocal of these 64 mm.
 const PER_REACH: Q16 = q16(15_625);
+/// The same of the part by which the tread winds up otherwise than by its model, per millimetre: 0.2,
+/// of a compound and a hub that make it 0.7 to 1.4 times as compliant.
+const UNKNOWN_WINDING: Ratio = q16(1_333_000);
+/// The same of its creep, of the same compliance and of a contact that is 0.25 longer or shorter.
+const UNKNOWN_CREEP: Ratio = q16(4_080_000);
+/// Variance of how far an edge seems to move under a climbing wheel, over that of a step's place: 0.3 mm,
+/// of a sensor of the mean compression, and of rubber that is thicker than its elements.
+const EDGE: Ratio = q16(3_000_000);
 /// Largest correction of the travel, relative.
 const MOST_SCALE: Ratio = q16(20_000);
-
-/// Largest correction at one step, mm: beyond it the step is not the one expected.
-const LARGEST: Millimetres = q16(2_000_000);
+/// The same of winding up and creep.
+const MOST_MORE: Ratio = q16(2_000_000);
 
 /// Travel of the tread after which it is converted to axial travel, mm. Shorter, the noise
 /// of the rise would count; longer, the position would lag on a corner.
@@ -31,9 +38,9 @@ const CHORD: Millimetres = q16(800_000);
 
 /// Offset of the position from the wheel's travel, and the chord that is not converted yet.
 ///
-/// Offset and scale of the travel are the least-squares estimate from the residuals of the
-/// steps: a Kalman filter with these two states, in units of a step's tolerance and of
-/// 64 mm (Kalman 1960).
+/// What is estimated from the residuals of the steps, by a Kalman filter (Kalman 1960): the offset of
+/// the travel, its scale, and the parts by which the tread creeps and winds up more than by its
+/// model. In units of a step's tolerance, over that of 64 mm, and over that of 1 mm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Odometry {
     offset: Travel,
@@ -41,29 +48,38 @@ pub struct Odometry {
     scale: Ratio,
     /// Position from which the travel counts, mm.
     origin: Millimetres,
-    /// Variances of position and scale, and their covariance.
-    variance: [Ratio; 2],
-    covariance: Ratio,
-    /// Parts of the last residual that position and scale took over.
+    /// Parts by which the tread creeps and winds up more than by its model.
+    more: [Ratio; 2],
+    /// By how much it did so since the origin, by the model, mm.
+    gave: [Millimetres; 2],
+    /// Covariance of place, scale, creep and winding up.
+    covariance: [[Ratio; STATES]; STATES],
+    /// Parts of the last residual that the position took over, and each of them.
     share: Ratio,
-    gain: Ratio,
+    gains: [Ratio; STATES],
+    /// How the states shifted the position where a step last corrected it.
+    mark: [Ratio; STATES],
     from: Option<Start>,
-    /// A slip has been taken off it since its origin.
-    slipped: bool,
 }
+
+/// Place, scale, creep and winding up.
+const STATES: usize = 4;
 
 impl Default for Odometry {
     fn default() -> Self {
+        let mut covariance = independent([KNOWN, UNKNOWN_RADIUS, UNKNOWN_CREEP, UNKNOWN_WINDING]);
+        (covariance[2][3], covariance[3][2]) = (UNKNOWN_WINDING, UNKNOWN_WINDING);
         Self {
             offset: Travel::ZERO,
             scale: Ratio::ZERO,
             origin: Millimetres::ZERO,
-            variance: [KNOWN, UNKNOWN_RADIUS],
-            covariance: Ratio::ZERO,
+            more: [Ratio::ZERO; 2],
+            gave: [Millimetres::ZERO; 2],
+            covariance,
             share: Ratio::ZERO,
-            gain: Ratio::ZERO,
+            gains: [Ratio::ZERO; STATES],
+            mark: [Ratio::ONE, Ratio::ZERO, Ratio::ZERO, Ratio::ZERO],
             from: None,
-            slipped: false,
         }
     }
 }
@@ -86,6 +102,17 @@ struct Start {
     radius: Millimetres,
 }
 
+fn sum(parts: &[Ratio; STATES], weights: &[Ratio; STATES]) -> Ratio {
+    parts.iter().zip(weights).fold(Q16::ZERO, |sum, (part, weight)| sum + *part * *weight)
+}
+
+/// A covariance of these variances.
+fn independent(variances: [Ratio; STATES]) -> [[Ratio; STATES]; STATES] {
+    core::array::from_fn(|i| {
+        core::array::from_fn(|j| if i == j { variances[i] } else { Ratio::ZERO })
+    })
+}
+
 impl Odometry {
     /// Position by this travel, mm from the stow end.
     pub fn position(&self, travel: Travel) -> Millimetres {
@@ -95,84 +122,111 @@ impl Odometry {
 
     /// Declares that the wheel is at `position`.
     pub fn set(&mut self, travel: Travel, position: Millimetres) {
-        *self = Self {
-            offset: position.widen().saturating_sub(travel),
-            origin: position,
-            ..Self::default()
-        };
+        let offset = position.widen().saturating_sub(travel);
+        *self = Self { offset, origin: position, ..Self::default() };
     }
 
-    /// Declares that the wheel is at `position` because a step was found: as sure as that
-    /// step's place.
+    /// Declares that the wheel is at `position`: a step was found there, as sure as its place.
     pub fn set_by_step(&mut self, travel: Travel, position: Millimetres) {
         self.set(travel, position);
-        self.variance[0] = Ratio::ONE;
+        self.covariance[0][0] = Ratio::ONE;
         self.share = Ratio::ONE;
     }
 
     /// Begins a run at `position`: what moved the arm since the last one was no rolling.
     pub fn begin_run(&mut self, position: Millimetres) {
-        let reach = (position - self.origin) * PER_REACH;
-        let [place, scale] = self.variance;
-        let both = self.covariance + self.covariance + reach * scale;
-        *self = Self {
-            offset: self.offset,
-            origin: position,
-            variance: [between(place + reach * both, KNOWN, Ratio::ONE), UNKNOWN_RADIUS],
-            ..Self::default()
-        };
-    }
-
-    /// A slip has been taken off the position since its origin: more of it may hide.
-    pub const fn has_slipped(&self) -> bool {
-        self.slipped
+        let place = between(self.variance(position), KNOWN, Ratio::ONE);
+        *self = Self { offset: self.offset, origin: position, ..Self::default() };
+        self.covariance[0][0] = place;
     }
 
     /// One sigma of `position`, mm.
     pub fn sigma(&self, position: Millimetres) -> Millimetres {
-        let reach = (position - self.origin) * PER_REACH;
-        let [place, scale] = self.variance;
-        let all = place + reach * (self.covariance + self.covariance + reach * scale);
-        sqrt(all.max(Q16::ZERO)) * PLACE
+        sqrt(self.variance(position).max(Q16::ZERO)) * PLACE
+    }
+
+    fn variance(&self, position: Millimetres) -> Ratio {
+        self.expect(&self.weights(position)).1
+    }
+
+    /// How the states shift the position.
+    fn weights(&self, position: Millimetres) -> [Ratio; STATES] {
+        let [crept, wound] = self.gave;
+        [Ratio::ONE, (position - self.origin) * PER_REACH, crept, wound]
+    }
+
+    /// Covariance of the states with their sum by these weights, and its variance.
+    fn expect(&self, weights: &[Ratio; STATES]) -> ([Ratio; STATES], Ratio) {
+        let with = self.covariance.each_ref().map(|row| sum(row, weights));
+        (with, sum(&with, weights))
+    }
+
+    /// The gains of a residual with these weights, whose variance is `noise`.
+    fn learn(&mut self, weights: &[Ratio; STATES], noise: Ratio) -> [Ratio; STATES] {
+        let (with, expected) = self.expect(weights);
+        let gains = with.map(|part| divide(part, noise + expected));
+        for (row, gain) in self.covariance.iter_mut().zip(gains) {
+            for (part, other) in row.iter_mut().zip(with) {
+                *part -= gain * other;
+            }
+        }
+        gains
+    }
+
+    /// What the tread gave way by since the origin, by its model, mm.
+    pub(super) fn gave(&self) -> Millimetres {
+        let [crept, wound] = self.gave;
+        crept + wound
+    }
+
+    /// The tread creeps and winds up by so much, mm; by how much as far as the steps show.
+    pub(super) fn give(&mut self, by: [Millimetres; 2]) -> Millimetres {
+        self.gave.iter_mut().zip(by).for_each(|(gave, by)| *gave += by);
+        by.iter().zip(self.more).fold(Q16::ZERO, |all, (by, more)| all + *by + *by * more)
     }
 
     /// The wheel has slipped: the axle is `lost` further in than the tread's travel has it, give or
     /// take `sigma`, mm.
     pub fn slip(&mut self, lost: Millimetres, sigma: Millimetres) {
         self.offset = self.offset.saturating_sub(lost.widen());
-        self.slipped |= lost > Q16::ZERO;
         let parts = sigma * PER_PLACE;
-        self.variance[0] += parts * parts;
+        self.covariance[0][0] += parts * parts;
     }
 
     /// Takes over its part of the difference between where a step was found, near `position`, and
     /// where the table has it, mm; what is left of it.
     pub fn correct(&mut self, position: Millimetres, residual: Millimetres) -> Millimetres {
-        let reach = (position - self.origin) * PER_REACH;
-        let [known, scale] = self.variance;
-        let place = known + WANDERS;
-        let (of_place, of_scale) =
-            (place + reach * self.covariance, self.covariance + reach * scale);
-        let expected = of_place + reach * of_scale;
-        let all = Ratio::ONE + expected;
-        let (gain_of_place, gain) = (divide(of_place, all), divide(of_scale, all));
-        self.variance = [
-            (place - gain_of_place * of_place).max(Q16::ZERO),
-            (scale - gain * of_scale).max(Q16::ZERO),
-        ];
-        self.covariance -= gain_of_place * of_scale;
-        (self.share, self.gain) = (divide(expected, all), gain);
-        let most = residual.clamp(-LARGEST, LARGEST);
-        residual - most + self.refine(most)
+        self.covariance[0][0] += WANDERS;
+        self.mark = self.weights(position);
+        self.gains = self.learn(&self.mark.clone(), Ratio::ONE);
+        self.share = sum(&self.gains, &self.mark);
+        self.refine(residual)
+    }
+
+    /// The edge that last corrected the position seems to have moved outwards by so much, mm, while the
+    /// wheel climbed to `position`: so far the tread gave way by more than its model has it.
+    pub fn climb(&mut self, position: Millimetres, moved: Millimetres) {
+        let weights = self.weights(position);
+        let since = core::array::from_fn(|i| weights[i] - self.mark[i]);
+        let gains = self.learn(&since, EDGE);
+        self.take(moved, sum(&gains, &weights), gains);
     }
 
     /// The step found last lies `shift` further out than its residual had it, mm; what is left of
     /// that.
     pub fn refine(&mut self, shift: Millimetres) -> Millimetres {
-        let taken = shift * self.share;
+        self.take(shift, self.share, self.gains)
+    }
+
+    fn take(&mut self, shift: Millimetres, share: Ratio, gains: [Ratio; STATES]) -> Millimetres {
+        let taken = shift * share;
         self.offset = self.offset.saturating_sub(taken.widen());
-        let scale = self.scale - shift * self.gain * PER_REACH;
+        let [_, scale, more @ ..] = gains;
+        let scale = self.scale - shift * scale * PER_REACH;
         self.scale = scale.clamp(-MOST_SCALE, MOST_SCALE);
+        for (part, gain) in self.more.iter_mut().zip(more) {
+            *part = (*part + shift * gain).clamp(-MOST_MORE, MOST_MORE);
+        }
         shift - taken
     }
 
@@ -282,65 +336,94 @@ mod tests {
         assert_eq!(odometry.position(Travel::from_num(5)), Q16::from_num(5));
     }
 
-    /// Position and scale by the inverse of their covariance in f64, which each step at a
-    /// distance adds its residual to.
-    fn least_squares(place: f64, found: &[(f64, f64)]) -> (f64, f64) {
-        let (mut p, mut q, mut r) = (place, 0.0, UNKNOWN_RADIUS.to_num::<f64>());
-        let (mut offset, mut scale) = (0.0, 0.0);
-        for (x, residual) in found {
-            let u = x / 64.0;
-            let p_wandered = p + WANDERS.to_num::<f64>();
-            let det = p_wandered * r - q * q;
-            let (a, b, c) = (r / det + 1.0, -q / det + u, p_wandered / det + u * u);
-            let missing = residual - offset - u * scale;
-            let det = a * c - b * b;
-            offset += (c - b * u) * missing / det;
-            scale += (a * u - b) * missing / det;
-            (p, q, r) = (c / det, -b / det, a / det);
+    /// What is left of the last of these residuals, each with its weights, by Gaussian regression:
+    /// with their covariance S and unit noise, the noise of the last is in `S^-1 y`.
+    fn least_squares(place: f64, found: &[([f64; STATES], f64)]) -> f64 {
+        let prior = Odometry::default().covariance.map(|row| row.map(Q16::to_num::<f64>));
+        let covariance = |i: usize, j: usize| {
+            let mut sum = place - prior[0][0] + WANDERS.to_num::<f64>() * (i.min(j) + 1) as f64;
+            for (a, row) in found[i].0.iter().zip(prior) {
+                sum += found[j].0.iter().zip(row).map(|(b, part)| a * b * part).sum::<f64>();
+            }
+            sum + f64::from(u8::from(i == j))
+        };
+        // Gaussian elimination: the last of its unknowns is all that counts.
+        let count = found.len();
+        let mut rows: Vec<Vec<f64>> = (0..count)
+            .map(|i| (0..count).map(|j| covariance(i, j)).chain([found[i].1]).collect())
+            .collect();
+        for i in 0..count {
+            let pivot = rows[i].clone();
+            for row in &mut rows[i + 1..] {
+                let part = row[i] / pivot[i];
+                row.iter_mut().zip(&pivot).for_each(|(a, b)| *a -= part * b);
+            }
         }
-        (offset, scale / 64.0)
+        rows[count - 1][count] / rows[count - 1][count - 1]
     }
 
     proptest! {
         #[test]
-        fn steps_give_position_and_radius_by_least_squares(
+        fn steps_give_position_radius_and_compliance_by_least_squares(
             back in any::<bool>(),
             by_step in any::<bool>(),
             places in proptest::collection::vec(-0.3..0.3f64, 1..8),
+            gives in proptest::collection::vec([0.0..0.3f64, -0.2..0.7f64], 8),
             stretch in -0.003..0.003f64,
+            more in [-0.4..0.4f64, -0.4..0.4f64],
             shift in -0.1..0.1f64,
         ) {
             let sign = if back { -1.0 } else { 1.0 };
-            let (mut odometry, mut travel) = (Odometry::default(), Travel::ZERO);
+            let (mut odometry, mut turned) = (Odometry::default(), Travel::ZERO);
+            let (mut gave, mut modelled) = (Travel::ZERO, [0.0; 2]);
             if by_step {
-                odometry.set_by_step(travel, Q16::from_num(50));
+                odometry.set_by_step(turned, Q16::from_num(50));
             } else {
-                odometry.set(travel, Q16::from_num(50));
+                odometry.set(turned, Q16::from_num(50));
             }
-            let place = odometry.variance[0].to_num::<f64>();
+            let place = odometry.covariance[0][0].to_num::<f64>();
             let rolling = Rolling { radius: Q16::ZERO, lag: Q16::ZERO, on_corner: false };
-            odometry.roll(travel, &rolling, true);
+            odometry.roll(turned, &rolling, true);
             // Every 20 mm of the tread a step; the table has it off by its place, and by how much
-            // farther the tread runs.
+            // farther the tread runs and gives way.
             let mut found = Vec::new();
-            for off in places {
-                let x = sign * 20.0 * (found.len() + 1) as f64;
-                found.push((x, x * stretch + off));
+            for (off, gives) in places.into_iter().zip(gives) {
                 for _ in 0..20 {
-                    travel += Travel::from_num(sign);
-                    odometry.roll(travel, &rolling, true);
+                    turned += Travel::from_num(sign);
+                    gave += odometry.give(gives.map(|by| Q16::from_num(by / 20.0))).widen();
+                    odometry.roll(turned - gave, &rolling, true);
                 }
-                let position = odometry.position(travel);
-                let residual = position - Q16::from_num(50.0 + x - x * stretch - off);
+                modelled = [0, 1].map(|i| modelled[i] + gives[i]);
+                let rolled = turned.to_num::<f64>() - modelled[0] - modelled[1];
+                let extra = rolled * stretch + more[0] * modelled[0] + more[1] * modelled[1] + off;
+                found.push(([1.0, rolled / 64.0, modelled[0], modelled[1]], extra));
+                let position = odometry.position(turned - gave);
+                let at_table = 50.0 + rolled - extra;
+                let residual = position - Q16::from_num(at_table);
                 // Found a little off at first.
                 let shift = Q16::from_num(shift);
                 let left = odometry.correct(position, residual - shift) + odometry.refine(shift);
-                prop_assert!((odometry.position(travel) - position + residual - left).abs() < q16(1_000));
-                let (offset, scale) = least_squares(place, &found);
-                let exact = 50.0 + x - offset - x * scale;
-                let got: f64 = odometry.position(travel).to_num();
+                let got = odometry.position(turned - gave);
+                prop_assert!((got - position + residual - left).abs() < q16(1_000));
+                let (got, exact) = (got.to_num::<f64>(), at_table + least_squares(place, &found));
                 prop_assert!((got - exact).abs() < 0.01, "{got} {exact}");
             }
+        }
+    }
+
+    #[test]
+    fn an_edge_under_a_climbing_wheel_shows_creep() {
+        for part in [-0.3, 0.3] {
+            let mut odometry = Odometry::default();
+            odometry.set(Travel::ZERO, Q16::from_num(50));
+            odometry.correct(Q16::from_num(50), Q16::ZERO);
+            odometry.give([q16(2_000_000), Q16::ZERO]);
+            // The axle lags by more than the model has it: the edge seems to move outwards.
+            let position = odometry.position(Travel::ZERO);
+            odometry.climb(position, Q16::from_num(2.0 * part));
+            let (taken, more) = (position - odometry.position(Travel::ZERO), odometry.more[0]);
+            let (taken, more) = (taken.to_num::<f64>() / (2.0 * part), more.to_num::<f64>() / part);
+            assert!((0.5..1.0).contains(&taken) && (0.5..1.0).contains(&more), "{taken} {more}");
         }
     }
 
@@ -356,7 +439,7 @@ mod tests {
                 let (at, off) = (Q16::from_num(at), Q16::from_num(off));
                 odometry.correct(at, odometry.position(at.widen()) - at - off);
             }
-            least = least.min(odometry.variance[0]);
+            least = least.min(odometry.covariance[0][0]);
         }
         // Never so sure that a step no longer counts, nor off by more than the steps are.
         let off: f64 = odometry.offset.to_num();

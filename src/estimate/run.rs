@@ -4,7 +4,7 @@ use super::crossing::Contact;
 use super::{EstimateState, Estimator, Findings, OpenCrossing, Position, PositionConfidence};
 use crate::fault::Fault;
 use crate::sense::SensedState;
-use crate::units::{Direction, Millimetres, Q16, Ratio, Tick, q16};
+use crate::units::{Direction, Millimetres, Newtons, Q16, Ratio, Tick, q16};
 
 /// Off a whole number of steps by no more than this, the arm shows a level: half the
 /// hysteresis of a corner, and the tolerances of sleeve and arm.
@@ -23,12 +23,15 @@ impl Estimator {
         sensed: &SensedState,
         now: Tick,
         direction: Direction,
+        load: Newtons,
     ) -> (Findings, bool) {
         let mut found = Findings { advanced: true, replan: true, ..Findings::default() };
         let turned = state.direction != direction;
         state.direction = direction;
         state.leaving = None;
         state.odometry.begin_run(state.position);
+        let carries = self.tread.means(Millimetres::ONE);
+        self.pulls.begin(&mut state.wind_up, sensed.travel, load, carries);
         if let Some(open) = state.crossing.as_mut() {
             open.slip.begin_run();
             open.hopeless_since = None;
@@ -140,8 +143,6 @@ impl Estimator {
             Direction::Deploy => (self.steps.count() + state.extra).saturating_sub(state.missed),
             Direction::Retract => 0,
         };
-        // Displaced, or is it the wheel: by a slip that was larger than it seemed?
-        let lost = state.displaced.is_some() && state.odometry.has_slipped();
         let on_wall = matches!(state.watch.contact, Contact::Wall | Contact::Leaving);
         // Steps that are not as high as the table has them add up.
         let off = (sensed.steps_up - Q16::from_num(expected)).abs() * self.steps.height();
@@ -149,7 +150,7 @@ impl Estimator {
             sensed.level == expected || off <= self.steps.height().half() + state.raised.abs();
         if !on_wall || !level || state.known.is_searching() {
             Err(Fault::LevelMismatch)
-        } else if state.known.is_unsure() || lost || self.sigma(state) > PLACE_WITHIN {
+        } else if state.known.is_unsure() || self.sigma(state) > PLACE_WITHIN {
             Err(Fault::PlaceUnconfirmed)
         } else {
             Ok(())
@@ -302,16 +303,7 @@ mod tests {
                 assert_eq!(confirmed.is_ok(), shown == level, "{missed} {extra} {shown}");
             }
         }
-        // Nor is it confirmed where the last step and the slip before it disagree,
-        for (displaced, slipped) in [(None, 0.2), (Some((1, q16(3_400_000))), 0.0)] {
-            let mut state = EstimateState { displaced, ..state(back, 0.0, 0) };
-            state.odometry.slip(Q16::from_num(slipped), Q16::ZERO);
-            assert_eq!(estimator().confirms_end(&state, &sensed(0, 0.0, 0.3)), Ok(()));
-            state.odometry.slip(q16(200_000), Q16::ZERO);
-            let confirmed = estimator().confirms_end(&state, &sensed(0, 0.0, 0.3));
-            assert_eq!(confirmed.is_ok(), displaced.is_none());
-        }
-        // or by a record that may be off.
+        // Nor is it confirmed by a record that may be off.
         let known = Position::Unconfirmed { searching: false };
         let state = EstimateState { known, ..state(back, 0.0, 0) };
         let confirmed = estimator().confirms_end(&state, &sensed(0, 0.0, 0.3));

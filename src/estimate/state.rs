@@ -5,11 +5,13 @@ use super::crossing_speed::CrossingSpeed;
 use super::landing::{Landing, Slide};
 use super::odometry::Odometry;
 use super::tread::{Shown, TreadState};
+use super::wind_up::WindUp;
 use super::{CornerSlip, Place, Position, PositionConfidence};
 use crate::fault::{Fault, Limit};
 use crate::model::LimitedBy;
 use crate::model::history::{History, HistoryWriter};
 use crate::numeric::LowPassState;
+use crate::sense::SensedState;
 use crate::units::{
     Direction, Millimetres, MillimetresPerSecond, Newtons, Q16, Ratio, Tick, Travel, q16,
 };
@@ -25,6 +27,7 @@ pub struct EstimateState {
     pub position: Millimetres,
     pub(super) odometry: Odometry,
     pub(super) known: Position,
+    pub(super) wind_up: WindUp,
     /// Crossing watch.
     pub watch: WatchState,
     pub(super) tread: TreadState,
@@ -74,6 +77,10 @@ pub struct OpenCrossing {
     pub reported: bool,
     /// Its step has corrected the position.
     pub corrected: bool,
+    /// It has found the position.
+    pub searched: bool,
+    /// What the edge showed while the wheel climbed has corrected it, too.
+    pub climbed: bool,
     /// When the corner was first detected.
     pub touched_at: Tick,
     /// Position of the face by the corner that carries, as soon as it shows, mm.
@@ -187,6 +194,29 @@ impl EstimateState {
     /// Preload behind the memory of the tread, N: what the tread has had time to take up.
     pub fn remembered_preload(&self) -> Newtons {
         self.remembered.output()
+    }
+
+    /// Travel that the drive is asked for, mm.
+    pub fn driven(&self, sensed: &SensedState) -> Travel {
+        sensed.travel.saturating_add(self.wind_up.lags())
+    }
+
+    /// How far the tread is wound up, mm.
+    pub fn wound(&self) -> Millimetres {
+        self.wind_up.displaced().abs()
+    }
+
+    /// Travel and speed of the wheel, mm and mm/s.
+    pub fn turns(&self, sensed: &SensedState) -> (Travel, MillimetresPerSecond) {
+        let wind_up = &self.wind_up;
+        (sensed.travel.saturating_add(wind_up.gave()), sensed.speed.value + wind_up.speed())
+    }
+
+    /// Takes off travel and speed of the wheel what moves no axle. A drive that `runs` makes up for it.
+    pub fn rim(&mut self, sensed: &mut SensedState, runs: bool) {
+        self.wind_up.follow(runs);
+        sensed.travel = sensed.travel.saturating_sub(self.wind_up.gave());
+        sensed.speed.value -= self.wind_up.speed();
     }
 
     /// Begins a tick at this travel of the wheel.

@@ -100,7 +100,7 @@ pub struct TreadState {
     ticks: u16,
     off: u16,
     /// The preload rose from below the least one since the wheel came to rest.
-    rises: bool,
+    pub(super) rises: bool,
     /// Where the wheel was at rest.
     from: Travel,
     rest: Sums,

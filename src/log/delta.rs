@@ -17,8 +17,7 @@ use crate::units::{Duty, Q16};
 const AGES: usize = SensorId::COUNT.div_ceil(4);
 const CODES: usize = SensorId::COUNT.div_ceil(2);
 
-/// Fields of a record coded as differences: the tick, the ages, and the quantities of
-/// [`Telemetry`].
+/// Fields of a record coded as differences: tick, ages, and those of [`Telemetry`].
 const NUMBERS: usize = 1 + AGES + Telemetry::QUANTITIES;
 
 /// Words of a record that are copied.
@@ -76,7 +75,7 @@ impl DeltaRecord {
             word(bridges[0], bridges[1]),
             word(t.drive.to_bits() as u16, t.pretightener.to_bits() as u16),
             u32::from_le_bytes([t.level, t.stage as u8, codes::of_mode(t.mode), 0]),
-            flags.to_bits().into(),
+            flags.0.into(),
         ];
         Self {
             numbers: filled([t.at].into_iter().chain(ages).chain(quantities)),
@@ -111,7 +110,7 @@ impl DeltaRecord {
             codes: filled(sensors.iter().flat_map(|word| halves(*word))),
             ages,
             bridges: halves(bridges),
-            flags: Flags::from_bits(u16::try_from(flags).ok()?),
+            flags: Flags(u16::try_from(flags).ok()?),
         })
     }
 
@@ -239,7 +238,7 @@ mod tests {
             let mut other = one;
             other.telemetry.at = one.telemetry.at.wrapping_add(1);
             other.telemetry.speed = Q16::from_bits(step.into());
-            prop_assert_eq!(written(&one, &other).len(), 4 + 2 * usize::from(step != 0));
+            prop_assert_eq!(written(&one, &other).len(), MAP + 2 * usize::from(step != 0));
         }
     }
 
@@ -248,11 +247,11 @@ mod tests {
         let before = Record::default();
         let mut after = before;
         after.telemetry.at += 1;
-        assert_eq!(written(&before, &after).len(), 4);
+        assert_eq!(written(&before, &after).len(), MAP);
         // Parity and age of the arm's frame alternate.
         after.codes[3] ^= 0x8000;
         after.ages[3] += 1;
-        assert_eq!(written(&before, &after).len(), 4 + 4 + 2);
+        assert_eq!(written(&before, &after).len(), MAP + 4 + 2);
     }
 
     #[test]

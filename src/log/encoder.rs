@@ -154,7 +154,7 @@ mod tests {
                 let frame = Frame::open(frame).unwrap();
                 heads.push(frame.head);
                 if let Body::Ticks(ticks) = frame.body().unwrap() {
-                    records.extend(ticks.map(Result::unwrap));
+                    records.extend(ticks.map(Option::unwrap));
                 }
             }
             (heads, records)

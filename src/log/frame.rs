@@ -10,13 +10,11 @@
 //! it; the check rejects a sync inside other content. Frames are independent: the loss of one
 //! affects no other. The sequence counts all frames since boot, `dropped` those without room.
 
-use serde::Deserialize;
-
-use super::crc32;
 use super::delta::DeltaRecord;
 use super::identity::Identity;
 use super::ledger::Line;
 use super::record::Record;
+use super::{complete, crc32};
 use crate::model::{Plan, PlanRequest};
 use crate::tick::Entry;
 use crate::units::Tick;
@@ -58,10 +56,8 @@ pub enum Kind {
 
 impl Kind {
     /// Every kind.
-    pub const ALL: [Self; 6] = {
-        use Kind::{Event, Identity, Ledger, Plan, Request, Ticks};
-        [Identity, Ticks, Plan, Request, Event, Ledger]
-    };
+    pub const ALL: [Self; 6] =
+        [Self::Identity, Self::Ticks, Self::Plan, Self::Request, Self::Event, Self::Ledger];
 }
 
 /// Head of a frame.
@@ -105,17 +101,6 @@ impl FrameBuffer {
         }
         &self.0[..end + CHECK]
     }
-}
-
-/// Why bytes are not a frame.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum FrameError {
-    /// Not the begin of a frame, or another length.
-    Form,
-    /// The check does not fit.
-    Check,
-    /// The check fits and the content does not: written by another program.
-    Content,
 }
 
 /// A frame whose check fits.
@@ -180,27 +165,20 @@ pub fn find(bytes: &[u8]) -> Found<'_> {
 }
 
 impl<'a> Frame<'a> {
-    /// Opens bytes that are one frame.
-    ///
-    /// # Errors
-    /// [`FrameError`] for anything but one complete frame.
-    pub fn open(bytes: &'a [u8]) -> Result<Self, FrameError> {
+    /// Opens bytes that are one complete frame.
+    pub fn open(bytes: &'a [u8]) -> Option<Self> {
         match find(bytes) {
-            Found::Frame(frame, length) if length == bytes.len() => Ok(frame),
-            Found::Garbage(1) => Err(FrameError::Check),
-            _ => Err(FrameError::Form),
+            Found::Frame(frame, length) if length == bytes.len() => Some(frame),
+            _ => None,
         }
     }
 
-    /// Reads the body.
-    ///
-    /// # Errors
-    /// [`FrameError::Content`] if it is not of its kind.
-    pub fn body(&self) -> Result<Body<'a>, FrameError> {
+    /// Reads the body; none if it is not of its kind: written by another program.
+    pub fn body(&self) -> Option<Body<'a>> {
         let Some(kind) = Kind::ALL.into_iter().find(|kind| *kind as u8 == self.head.kind) else {
-            return Ok(Body::Unknown);
+            return Some(Body::Unknown);
         };
-        Ok(match kind {
+        Some(match kind {
             Kind::Identity => Body::Identity(complete(self.body)?),
             Kind::Ticks => Body::Ticks(Ticks { before: DeltaRecord::ZERO, rest: self.body }),
             Kind::Plan => complete(self.body).map(|(at, plan)| Body::Plan(at, plan))?,
@@ -211,14 +189,7 @@ impl<'a> Frame<'a> {
     }
 }
 
-fn complete<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Result<T, FrameError> {
-    match postcard::take_from_bytes(bytes) {
-        Ok((value, [])) => Ok(value),
-        _ => Err(FrameError::Content),
-    }
-}
-
-/// The records of a frame, in their order.
+/// The records of a frame, in their order; none in place of the first that is not one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ticks<'a> {
     before: DeltaRecord,
@@ -226,7 +197,7 @@ pub struct Ticks<'a> {
 }
 
 impl Iterator for Ticks<'_> {
-    type Item = Result<Record, FrameError>;
+    type Item = Option<Record>;
 
     fn next(&mut self) -> Option<Self::Item> {
         if self.rest.is_empty() {
@@ -240,7 +211,7 @@ impl Iterator for Ticks<'_> {
         if read.is_none() {
             self.rest = &[];
         }
-        Some(read.ok_or(FrameError::Content))
+        Some(read)
     }
 }
 
@@ -338,7 +309,7 @@ mod tests {
             let frame = Frame::open(&bytes).unwrap();
             prop_assert_eq!(frame.head, head(Kind::Ticks, sequence));
             let Body::Ticks(ticks) = frame.body().unwrap() else { panic!("ticks") };
-            let back: Vec<Record> = ticks.map(Result::unwrap).collect();
+            let back: Vec<Record> = ticks.map(Option::unwrap).collect();
             prop_assert_eq!(&back[..], &records[..put]);
             prop_assert!(put >= 4.min(records.len()), "{} of any kind fit", put);
         }
@@ -348,7 +319,7 @@ mod tests {
             let mut bytes = frame(&[record], 9).0;
             let at = at.index(bytes.len());
             bytes[at] ^= 1_u8 << bit;
-            prop_assert!(Frame::open(&bytes).is_err());
+            prop_assert!(Frame::open(&bytes).is_none());
         }
 
         #[test]

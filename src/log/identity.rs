@@ -7,9 +7,9 @@ use crate::sense::raw::SensorId;
 use crate::tick::Telemetry;
 use crate::units::Millimetres;
 
-/// Number of the frames' layout beside the names of sensors and quantities, changed with it. Logs
-/// of the names before this hash have schema 7.
-const LAYOUT: u16 = 0x0836;
+/// Number of the frames' layout beside the names of sensors and quantities, changed with it.
+/// Today's names have schema 8.
+const LAYOUT: u16 = 0x79B9;
 
 /// Layout of the frames: a hash of the names in it (FNV-1a, folded). A reader of another number
 /// reports that and decodes nothing.

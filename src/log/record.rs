@@ -1,5 +1,4 @@
-//! One tick in the log: all inputs and outputs, so that a host can run it again and compare
-//! bits.
+//! One tick in the log: all inputs and outputs, so that a host can compare its bits.
 
 use crate::sense::raw::{BridgeCode, BridgeCodes, Sample, SensorFrame, SensorId};
 use crate::supervise::{Command, codes};
@@ -13,7 +12,7 @@ const OLD: u8 = 254;
 /// Code of a sensor without a reading.
 const NEVER: u8 = 255;
 
-/// A tick's input and output in 88 bytes. Plan, request and log entries are rare and have frames
+/// A tick's input and output in 92 bytes. Plan, request and log entries are rare and have frames
 /// of their own; flags show that there were some.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Record {
@@ -31,7 +30,7 @@ pub struct Record {
 
 /// Inputs and outputs beside codes and state.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Flags(u16);
+pub struct Flags(pub u16);
 
 impl Flags {
     const COMMAND: u16 = 0b111;
@@ -71,16 +70,6 @@ impl Flags {
                 | bit(input.service.is_some(), Self::SERVICE)
                 | (output.events.len() as u16) << Self::EVENTS,
         )
-    }
-
-    /// Flags from their bits.
-    pub const fn from_bits(bits: u16) -> Self {
-        Self(bits)
-    }
-
-    /// Their bits.
-    pub const fn to_bits(self) -> u16 {
-        self.0
     }
 
     /// Whether this flag is set.
@@ -196,12 +185,12 @@ pub(super) mod tests {
             .prop_map(
                 |((at, mode, stage, level, q, duties), (codes, ages, bridges, flags))| {
                     let [drive, pretightener] = duties.map(Duty::from_bits);
-                    let mode = Mode::WITHOUT_FAULT[mode];
+                    let mode = Mode::WITHOUT_FAULT[mode].0;
                     let stage = codes::stage(stage).unwrap();
                     let plain = Telemetry::default();
                     let state = Telemetry { at, mode, stage, level, drive, pretightener, ..plain };
                     let telemetry = state.with_quantities(q.map(Q16::from_bits));
-                    Record { telemetry, codes, ages, bridges, flags: Flags::from_bits(flags) }
+                    Record { telemetry, codes, ages, bridges, flags: Flags(flags) }
                 },
             )
     }

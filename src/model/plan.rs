@@ -2,7 +2,7 @@
 
 use super::approach::Approach;
 use super::history::History;
-use crate::fault::Limit;
+use crate::fault::{Limit, worded};
 use crate::units::{Direction, Millimetres, MillimetresPerSecond, Newtons, Ratio, Seconds, q16};
 
 /// One sigma of the logarithm of the stiffness of a tread as known: stiffness 4 %, stiffening 3 %
@@ -28,41 +28,24 @@ pub enum Strategy {
     Reactive,
 }
 
-/// What keeps the crossing of a step from being faster.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum LimitedBy {
+worded! {
+    /// What keeps the crossing of a step from being faster.
+    #[derive(Default)]
+    #[serde(rename_all = "kebab-case")]
+    LimitedBy, words:
     /// The preload is as high as it may be.
     #[default]
-    Preload,
+    Preload "preload";
     /// The pre-tightener's slew: more preload would take longer to build than it saves.
-    Slew,
+    Slew "slew";
     /// The slip margin: the gap is made smaller than the wanted one.
-    Friction,
+    Friction "friction";
     /// The band of a mode below the speed that gap and margin allow.
-    Resonance,
+    Resonance "resonance";
     /// The least crossing speed: gap or margin would ask for less.
-    LeastSpeed,
+    LeastSpeed "least speed";
     /// The drive's cruise speed, or that at which the pre-tightener still follows the spring.
-    Drive,
-}
-
-impl LimitedBy {
-    /// All of them.
-    pub const ALL: [Self; 6] =
-        [Self::Preload, Self::Slew, Self::Friction, Self::Resonance, Self::LeastSpeed, Self::Drive];
-
-    /// In words.
-    pub const fn words(self) -> &'static str {
-        match self {
-            Self::Preload => "preload",
-            Self::Slew => "slew",
-            Self::Friction => "friction",
-            Self::Resonance => "resonance",
-            Self::LeastSpeed => "least speed",
-            Self::Drive => "drive",
-        }
-    }
+    Drive "drive";
 }
 
 /// A closed crossing, for the model to compare with its prediction.

@@ -15,6 +15,7 @@ use super::plan::{Learned, LimitedBy, Plan, PlanRequest, Review, Strategy};
 use super::profile::Profile;
 use super::timing::Timing;
 use super::tread::{Tread, TreadState};
+use super::wind_up::Shear;
 use crate::fault::Limit;
 use crate::numeric::{between, divide, sqrt};
 use crate::rig::MAX_STEPS;
@@ -83,6 +84,7 @@ struct PretightenerModel {
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Planner {
     tread: Tread,
+    shear: Shear,
     profile: Profile,
     timing: Timing,
     drive: DriveModel,

@@ -3,6 +3,7 @@
 #![deny(clippy::float_arithmetic)]
 
 use super::tread::{Axial, Contact, Drive, Tread, TreadState};
+use super::wind_up::Shear;
 use crate::numeric::{between, divide, sqrt};
 use crate::units::{Direction, Millimetres, MillimetresPerSecond, Newtons, Q16, Ratio, q16};
 
@@ -116,6 +117,8 @@ pub struct Run {
     pub scale: Ratio,
     /// The axle moves as far as the tread.
     pub level: bool,
+    /// How the tread gives way along the wall; none if it does not.
+    pub shear: Option<Shear>,
     /// Position at which it begins and ends at the latest, from the face outwards, mm.
     pub from: Millimetres,
     /// See `from`.
@@ -139,20 +142,28 @@ pub fn roll(
         axial: run.axial,
         pressed: course(run.from).1,
         duration: Q16::ZERO,
+        gives: Q16::ZERO,
         scale: run.scale,
         level: run.level,
     };
     tread.put_down(state, run.from, &drive);
     let mut rolled = Rolled::default();
     let mut position = run.from;
+    let sense = if forward { Q16::ONE } else { -Q16::ONE };
+    let load = if let Axial::Driven(load) = run.axial { load } else { Q16::ZERO };
+    let mut winding = run.shear.map(|shear| shear.rest(load));
     // The wheel needs a stride to each stride of travel, and on the edge up to twice that.
     let most = between(divide((run.until - run.from).abs(), tread.stride()).floor(), 0, 2000);
     for _ in 0..2 * most {
         let (speed, pressed) = course(position);
         drive.pressed = pressed;
-        drive.duration = divide(tread.stride(), speed.max(LEAST_SPEED));
+        drive.duration = divide(tread.stride() - drive.gives, speed.max(LEAST_SPEED));
         let contact = tread.advance(state, &drive);
         position = contact.position;
+        if let (Some(shear), Some(winding)) = (&run.shear, &mut winding) {
+            let stride = (tread.stride(), drive.duration);
+            drive.gives = sense * shear.follow(winding, &contact, stride);
+        }
         rolled.visits += contact.visits;
         rolled.strides += 1;
         rolled.lift.follow(tread, run.direction, &contact);

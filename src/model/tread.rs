@@ -76,6 +76,8 @@ pub struct Drive {
     pub pressed: Newtons,
     /// Duration, s.
     pub duration: Seconds,
+    /// By how much less than the tread the axle moves, since the tread gives way along the wall, mm.
+    pub gives: Millimetres,
     /// Stiffness over the nominal one.
     pub scale: Ratio,
     /// The axle moves as far as the tread.
@@ -215,6 +217,7 @@ impl Tread {
         if drive.level {
             return self.stride.to_bits() << 6;
         }
+        let rolled = self.stride - between(drive.gives, -self.stride, self.stride);
         let slope = divide(Q16::from_bits(state.frame.climb >> 6), self.stride);
         let level = sqrt((Q16::ONE - slope * slope).max(Q16::ZERO));
         let wall = if state.frame.position >= 0 { self.height } else { 0 };
@@ -223,13 +226,13 @@ impl Tread {
         let rolls = Q16::ONE - compression * self.rolling_lag;
         // Q16 x Q16 to Q22, kept to the last bit.
         let part = level * rolls;
-        ((i64::from(part.to_bits()) * i64::from(self.stride.to_bits())) >> 10) as i32
+        ((i64::from(part.to_bits()) * i64::from(rolled.to_bits())) >> 10) as i32
     }
 
     /// What the rays meet. A ray at the angle a meets the lower wall before the face for
     /// `y tan a < -x`, and the upper wall behind the corner for `(y - h) tan a > -x`.
     fn facets(&self, state: &Frame) -> Facets {
-        let to_face = -state.position;
+        let to_face = state.position.saturating_neg();
         let above = (state.centre - self.height).max(1);
         let first = |height: i32, from: i32| {
             let beyond = |place: &i32| {

@@ -1,7 +1,5 @@
 //! From a rig to the board's parameter set; runs on the host.
 
-use core::fmt;
-
 use serde::Serialize;
 
 use super::MAX_SET;
@@ -13,32 +11,17 @@ use crate::rig::{Rig, RigError};
 use crate::tick::Controller;
 
 /// Why no set can be made.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum CompileError {
     /// The rig is not sound.
-    Rig(RigError),
+    #[error(transparent)]
+    Rig(#[from] RigError),
     /// The name is longer than [`MAX_NAME`] bytes.
+    #[error("the name of the rig: expected at most {MAX_NAME} bytes")]
     Name,
     /// The set is longer than [`MAX_SET`].
+    #[error("the set does not fit its slot")]
     Room,
-}
-
-impl fmt::Display for CompileError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Rig(error) => error.fmt(f),
-            Self::Name => write!(f, "the name of the rig: expected at most {MAX_NAME} bytes"),
-            Self::Room => f.write_str("the set does not fit its slot"),
-        }
-    }
-}
-
-impl core::error::Error for CompileError {}
-
-impl From<RigError> for CompileError {
-    fn from(error: RigError) -> Self {
-        Self::Rig(error)
-    }
 }
 
 /// The set of this rig, at most [`MAX_SET`] bytes.

@@ -5,7 +5,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::log::crc32;
+use crate::log::{complete, crc32};
 use crate::params::service::{Request, Response};
 
 /// Longest frame including its end, bytes.
@@ -89,10 +89,7 @@ fn open<T: for<'de> Deserialize<'de>>(coded: &mut [u8]) -> Option<T> {
     if crc32(content) != u32::from_le_bytes(*sum) {
         return None;
     }
-    match postcard::take_from_bytes(content) {
-        Ok((message, [])) => Some(message),
-        _ => None,
-    }
+    complete(content)
 }
 
 #[cfg(test)]

@@ -10,14 +10,15 @@ use core::fmt;
 
 use serde::{Deserialize, Serialize};
 
-use crate::log::crc32;
+use crate::fault::worded;
+use crate::log::{complete, crc32};
 use crate::model::Planner;
 use crate::rig::Rig;
 use crate::tick::Controller;
 
 /// Layout of the constants. Raised with every change of a type that a set holds; a set of
 /// another number is refused, and the host makes it again from its rig.
-pub const SCHEMA: u16 = 13;
+pub const SCHEMA: u16 = 14;
 
 /// Longest name of a set, bytes.
 pub const MAX_NAME: usize = 24;
@@ -80,53 +81,20 @@ impl fmt::Display for SetError {
 
 impl core::error::Error for SetError {}
 
-/// Reason of a refusal.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Refusal {
-    /// The drive is not at rest.
-    Moving,
-    /// There is no draft: `Begin` comes first.
-    NoDraft,
-    /// The set is too long or incomplete.
-    Length,
-    /// A piece is not a multiple of eight bytes.
-    Piece,
-    /// The flash failed.
-    Flash,
-    /// The set is damaged or not readable.
-    Damaged,
-    /// The set is of another schema.
-    Schema,
-    /// The set in force is damaged.
-    Lost,
-    /// The drive is neither idle nor in the service mode, or a motion is asked for before the
-    /// service mode.
-    NotService,
-    /// The service mode does not drive with this duty, or with two motors at once.
-    Duty,
-    /// Too many commands wait for the control tick.
-    Busy,
-}
-
-impl Refusal {
-    /// The reason in words.
-    pub const fn sentence(self) -> &'static str {
-        match self {
-            Self::Moving => "the drive is not at rest",
-            Self::NoDraft => "no new set has been begun",
-            Self::Length => "the new set is too long or not all there",
-            Self::Piece => "a piece of the new set is no multiple of eight bytes",
-            Self::Flash => "the flash failed",
-            Self::Damaged => "the new set arrived damaged",
-            Self::Schema => "the new set is of another schema than the firmware",
-            Self::Lost => "the set in force is damaged: restore the image's, or one from a file",
-            Self::NotService => {
-                "the drive is not in the service mode, which it enters from idle alone"
-            }
-            Self::Duty => "the service mode drives one motor at a time, with a small duty",
-            Self::Busy => "too many commands wait for the control tick",
-        }
-    }
+worded! {
+    /// Reason of a refusal.
+    Refusal, sentence:
+    Moving "the drive is not at rest";
+    NoDraft "no new set has been begun";
+    Length "the new set is too long or not all there";
+    Piece "a piece of the new set is no multiple of eight bytes";
+    Flash "the flash failed";
+    Damaged "the new set arrived damaged";
+    Schema "the new set is of another schema than the firmware";
+    Lost "the set in force is damaged: restore the image's, or one from a file";
+    NotService "the drive is not in the service mode, which it enters from idle alone";
+    Duty "the service mode drives one motor at a time, with a small duty";
+    Busy "too many commands wait for the control tick";
 }
 
 impl From<SetError> for Refusal {
@@ -170,7 +138,8 @@ impl<'a> ParameterSet<'a> {
         if crc32(content) != u32::from_le_bytes(*sum) {
             return Err(SetError::Damaged);
         }
-        let (header, body) = take::<Header>(content)?;
+        let (header, body) =
+            postcard::take_from_bytes::<Header>(content).map_err(|_| SetError::Content)?;
         let parts = body.split_at_checked(header.rig_length.into());
         let (rig, constants) = parts.ok_or(SetError::Content)?;
         Ok(Self { header, rig, constants })
@@ -197,10 +166,7 @@ impl<'a> ParameterSet<'a> {
     /// # Errors
     /// [`SetError::Content`] if the bytes are not one.
     pub fn rig(&self) -> Result<Rig, SetError> {
-        match take(self.rig)? {
-            (rig, []) => Ok(rig),
-            _ => Err(SetError::Content),
-        }
+        complete(self.rig).ok_or(SetError::Content)
     }
 }
 
@@ -215,10 +181,7 @@ impl Rest<'_> {
     /// [`SetError::Content`] if the bytes are not one; `place` then holds anything.
     #[inline(never)]
     pub fn read_planner(self, place: &mut Planner) -> Result<(), SetError> {
-        match into(self.0, place)? {
-            [] => Ok(()),
-            _ => Err(SetError::Content),
-        }
+        into(self.0, place)?.is_empty().then_some(()).ok_or(SetError::Content)
     }
 }
 
@@ -227,10 +190,6 @@ fn into<'a, T: Deserialize<'a>>(bytes: &'a [u8], place: &mut T) -> Result<&'a [u
     let mut bytes = postcard::Deserializer::from_bytes(bytes);
     T::deserialize_in_place(&mut bytes, place).map_err(|_| SetError::Content)?;
     bytes.finalize().map_err(|_| SetError::Content)
-}
-
-fn take<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Result<(T, &'a [u8]), SetError> {
-    postcard::take_from_bytes(bytes).map_err(|_| SetError::Content)
 }
 
 #[cfg(test)]

@@ -60,16 +60,6 @@ impl Slot {
     }
 }
 
-/// The flash refused or failed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct FlashFault;
-
-impl From<FlashFault> for Refusal {
-    fn from(FlashFault: FlashFault) -> Self {
-        Self::Flash
-    }
-}
-
 /// Flash that holds both slots, mapped into memory.
 pub trait SetMemory {
     /// The content of a slot, [`SLOT_BYTES`] long.
@@ -84,20 +74,20 @@ pub trait SetMemory {
     /// Erases one page of a slot to 0xFF; takes about 25 ms.
     ///
     /// # Errors
-    /// [`FlashFault`] if the page is not blank afterwards.
-    async fn erase(&mut self, slot: Slot, page: usize) -> Result<(), FlashFault>;
+    /// [`Refusal::Flash`] if the page is not blank afterwards.
+    async fn erase(&mut self, slot: Slot, page: usize) -> Result<(), Refusal>;
 
     /// Programs a double word at `offset` bytes, a multiple of eight, which has to be
     /// blank; takes about 0.1 ms.
     ///
     /// # Errors
-    /// [`FlashFault`] if it was not taken.
+    /// [`Refusal::Flash`] if it was not taken.
     async fn program(
         &mut self,
         slot: Slot,
         offset: usize,
         word: [u8; WORD_BYTES],
-    ) -> Result<(), FlashFault>;
+    ) -> Result<(), Refusal>;
 }
 
 /// An intact set in its slot.
@@ -284,8 +274,7 @@ impl Draft {
     }
 }
 
-/// Reads a controller; like the planner in a frame of its own, so that the stack never holds
-/// both.
+/// Reads a controller, in a frame of its own: the stack never holds it and the planner.
 #[inline(never)]
 fn check_controller<'a>(set: &ParameterSet<'a>) -> Result<Rest<'a>, SetError> {
     set.read_controller(&mut Controller::default())

@@ -1,16 +1,15 @@
 //! What stopped the program.
 
-use core::fmt;
-
 use serde::{Deserialize, Serialize};
 
 use super::{CRASH_WORDS, MissedCheckIns, check};
 use crate::units::Tick;
 
 /// What stopped the program.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
 pub enum Stopped {
     /// A panic.
+    #[error("a panic in line {line}, place {place:#x}")]
     Panic {
         /// Address of the place's description in the image.
         place: u32,
@@ -18,6 +17,7 @@ pub enum Stopped {
         line: u32,
     },
     /// A hard fault.
+    #[error("a hard fault at {pc:#x} from {lr:#x}, CFSR {cfsr:#x}, HFSR {hfsr:#x}")]
     Fault {
         /// Instruction that faulted, 0 if the stack does not tell.
         pc: u32,
@@ -29,6 +29,7 @@ pub enum Stopped {
         hfsr: u32,
     },
     /// The watchdog was no longer fed.
+    #[error("{} did not come, at {pc:#x} from {lr:#x}", missed.name())]
     Hang {
         /// Instruction at which the processor was.
         pc: u32,
@@ -40,8 +41,10 @@ pub enum Stopped {
         at: Tick,
     },
     /// The supply fell too low.
+    #[error("the supply fell too low")]
     Supply,
     /// A bit of the image had flipped.
+    #[error("a bit of the image had turned over")]
     Image,
 }
 
@@ -63,7 +66,7 @@ impl Crash {
         let (kind, [a, b, c, d]) = match self.stopped {
             Stopped::Panic { place, line } => (1, [place, line, 0, 0]),
             Stopped::Fault { pc, lr, cfsr, hfsr } => (2, [pc, lr, cfsr, hfsr]),
-            Stopped::Hang { pc, lr, missed, at } => (3, [pc, lr, u32::from(missed.bits()), at]),
+            Stopped::Hang { pc, lr, missed, at } => (3, [pc, lr, u32::from(missed.0), at]),
             Stopped::Supply => (4, [0; 4]),
             Stopped::Image => (5, [0; 4]),
         };
@@ -77,28 +80,12 @@ impl Crash {
         let stopped = match kind {
             1 => Stopped::Panic { place: a, line: b },
             2 => Stopped::Fault { pc: a, lr: b, cfsr: c, hfsr: d },
-            3 => Stopped::Hang { pc: a, lr: b, missed: MissedCheckIns::from_bits(c as u16), at: d },
+            3 => Stopped::Hang { pc: a, lr: b, missed: MissedCheckIns(c as u16), at: d },
             4 => Stopped::Supply,
             5 => Stopped::Image,
             _ => return None,
         };
         let sound = check(Self::SEED, &[kind, build, a, b, c, d]) == sum;
         sound.then_some(Self { build, stopped })
-    }
-}
-
-impl fmt::Display for Stopped {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match *self {
-            Self::Panic { place, line } => write!(f, "a panic in line {line}, place {place:#x}"),
-            Self::Fault { pc, lr, cfsr, hfsr } => {
-                write!(f, "a hard fault at {pc:#x} from {lr:#x}, CFSR {cfsr:#x}, HFSR {hfsr:#x}")
-            }
-            Self::Hang { pc, lr, missed, .. } => {
-                write!(f, "{} did not come, at {pc:#x} from {lr:#x}", missed.name())
-            }
-            Self::Supply => f.write_str("the supply fell too low"),
-            Self::Image => f.write_str("a bit of the image had turned over"),
-        }
     }
 }

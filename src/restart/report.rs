@@ -6,35 +6,18 @@ use serde::{Deserialize, Serialize};
 
 use super::{Crash, DriveSnapshot, PackedSpeed, Stopped};
 use crate::estimate::Place;
-use crate::fault::Fault;
+use crate::fault::{Fault, worded};
 use crate::units::{Millimetres, Tick, ticks_to_seconds};
 
-/// Reason of a start, by the chip.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Reset {
+worded! {
+    /// Reason of a start, by the chip.
+    Reset, sentence:
     /// Power came up, or fell too low and came back.
-    Power,
-    /// The reset pin.
-    Pin,
-    /// The program or a debugger asked for it.
-    Software,
-    /// The watchdog.
-    Watchdog,
-    /// Another reason.
-    Other,
-}
-
-impl Reset {
-    /// In words.
-    pub const fn sentence(self) -> &'static str {
-        match self {
-            Self::Power => "power came up",
-            Self::Pin => "by the reset pin",
-            Self::Software => "by software or debugger",
-            Self::Watchdog => "by the watchdog",
-            Self::Other => "for a reason that the chip does not tell",
-        }
-    }
+    Power "power came up";
+    Pin "by the reset pin";
+    Software "by software or debugger";
+    Watchdog "by the watchdog";
+    Other "for a reason that the chip does not tell";
 }
 
 /// What a start reports of the run before.

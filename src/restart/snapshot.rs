@@ -63,7 +63,7 @@ impl PackedZeros {
 
 /// Tasks that had not checked in when the watchdog was no longer fed, one bit a task.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct MissedCheckIns(u16);
+pub struct MissedCheckIns(pub u16);
 
 impl MissedCheckIns {
     /// All tasks have checked in.
@@ -86,16 +86,6 @@ impl MissedCheckIns {
     /// Whether all tasks have checked in.
     pub const fn is_nobody(self) -> bool {
         self.0 == 0
-    }
-
-    /// The bits.
-    pub const fn bits(self) -> u16 {
-        self.0
-    }
-
-    /// From the bits.
-    pub const fn from_bits(bits: u16) -> Self {
-        Self(bits)
     }
 
     /// Name of the first task.
@@ -144,7 +134,7 @@ impl DriveSnapshot {
     /// As words.
     pub fn seal(&self) -> [u32; SNAPSHOT_WORDS] {
         let state = u32::from(self.mode) | u32::from(self.level) << 8 | u32::from(self.fault) << 16;
-        let missed = u32::from(self.missed.bits()) | u32::from(self.packed_speed.0 as u16) << 16;
+        let missed = u32::from(self.missed.0) | u32::from(self.packed_speed.0 as u16) << 16;
         let [a, b, c, d] = [self.tick, self.position.to_bits() as u32, state, missed];
         let PackedZeros(preload, compression) = self.packed_zeros;
         let e = u32::from(preload as u16) | u32::from(compression as u16) << 16;
@@ -160,7 +150,7 @@ impl DriveSnapshot {
             mode: state as u8,
             level: (state >> 8) as u8,
             fault: (state >> 16) as u16,
-            missed: MissedCheckIns::from_bits(missed as u16),
+            missed: MissedCheckIns(missed as u16),
             packed_speed: PackedSpeed((missed >> 16) as i16),
             packed_zeros: PackedZeros(zeros as i16, (zeros >> 16) as i16),
         })

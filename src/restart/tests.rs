@@ -16,7 +16,7 @@ fn snapshot() -> impl Strategy<Value = DriveSnapshot> {
             mode,
             level,
             fault,
-            missed: MissedCheckIns::from_bits(missed),
+            missed: MissedCheckIns(missed),
             packed_speed: PackedSpeed(packed_speed),
             packed_zeros: PackedZeros(zeros.0, zeros.1),
         },
@@ -29,7 +29,7 @@ fn crash() -> impl Strategy<Value = Crash> {
         stopped: match kind {
             0 => Stopped::Panic { place: a, line: b },
             1 => Stopped::Fault { pc: a, lr: b, cfsr: c, hfsr: d },
-            2 => Stopped::Hang { pc: a, lr: b, missed: MissedCheckIns::from_bits(c as u16), at: d },
+            2 => Stopped::Hang { pc: a, lr: b, missed: MissedCheckIns(c as u16), at: d },
             3 => Stopped::Supply,
             _ => Stopped::Image,
         },
@@ -224,7 +224,7 @@ fn everyone_has_a_name() {
     assert_eq!(MissedCheckIns::NOBODY.name(), "nobody");
     assert!(MissedCheckIns::NOBODY.is_nobody() && !MissedCheckIns::TICK.is_nobody());
     let names: std::collections::BTreeSet<_> =
-        (0..16).map(|bit| MissedCheckIns::from_bits(1 << bit).name()).collect();
+        (0..16).map(|bit| MissedCheckIns(1 << bit).name()).collect();
     assert_eq!(names.len(), 9, "{names:?}");
     assert_eq!(MissedCheckIns::TICK.and(MissedCheckIns::task(1)).name(), "preload sensor");
     assert_eq!(MissedCheckIns::STARVED.name(), "the control tick, kept from the processor");

@@ -18,14 +18,18 @@ impl Rig {
                 arm_length_mm: 145.0,
                 arm_pivot_radius_mm: 20.0,
             },
-            tread: Tread { k_inf_pa_per_m: 0.6044e9, stiffening: 4.2235, tau_s: 0.1059 },
+            tread: Tread {
+                k_inf_pa_per_m: 0.6044e9,
+                stiffening: 4.2235,
+                tau_s: 0.1059,
+                thickness_mm: 8.0,
+            },
             plant: Loads {
                 mu: 1.1,
                 top_load_n: 20.0,
                 top_load_share: 1.0 / 3.0,
                 moved_mass_kg: 1.0,
                 arm_coupling: 1.0,
-                elastic_creep: 0.01,
             },
             preload: Pretightener {
                 cruise_n: 33.3,

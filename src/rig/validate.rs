@@ -13,9 +13,10 @@ const LEAST_GRIP: f64 = 1e-3;
 const TOP_SPEED_RESERVE: f64 = 1.2;
 
 /// Error of a parameter set: the key, its value, the expected range.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum RigError {
     /// A value lies outside its range.
+    #[error("{key} = {value}: expected a value from {min} to {max}")]
     OutOfRange {
         /// Key of the parameter, as in a scenario file.
         key: &'static str,
@@ -27,6 +28,10 @@ pub enum RigError {
         max: f64,
     },
     /// The step table is not ascending with room for a wheel between the steps.
+    #[error(
+        "rig.step_positions_mm: step {step} is at {position_mm} mm, expected at least \
+         {least_mm:.1} mm: the wheel has to finish one step before it touches the next"
+    )]
     StepOrder {
         /// Position of the offending step in the table, from 1.
         step: usize,
@@ -36,6 +41,10 @@ pub enum RigError {
         least_mm: f64,
     },
     /// A step lies beyond the travel.
+    #[error(
+        "rig.step_positions_mm: step {step} is at {position_mm} mm, expected at most {travel_mm} \
+         mm, which is rig.travel_mm"
+    )]
     StepBeyondTravel {
         /// Position of the offending step in the table, from 1.
         step: usize,
@@ -46,6 +55,8 @@ pub enum RigError {
     },
     /// Two values that do not go together: the upper one has to be at least `ratio` times the
     /// lower one.
+    #[error("{} = {}: expected at least {:.1}, as {} = {}",
+        upper.0, upper.1, lower.1 * ratio, lower.0, lower.1)]
     Pair {
         /// Key and value of the upper one.
         upper: (&'static str, f64),
@@ -55,6 +66,7 @@ pub enum RigError {
         ratio: f64,
     },
     /// A value with which the drive could not do its work.
+    #[error("{} = {value}: expected {bound}: {reason}", keys.first().unwrap_or(&"rig"))]
     Unable {
         /// The value found.
         value: f64,
@@ -66,6 +78,10 @@ pub enum RigError {
         keys: &'static [&'static str],
     },
     /// The arm cannot reach a wall at this radius.
+    #[error(
+        "rig.arm_length_mm: the arm reaches wheel-centre radii from {min_mm:.1} to {max_mm:.1} mm, \
+         expected to include {radius_mm:.1} mm"
+    )]
     OutOfReach {
         /// Wheel-centre radius asked for, mm.
         radius_mm: f64,
@@ -75,39 +91,6 @@ pub enum RigError {
         max_mm: f64,
     },
 }
-
-impl core::fmt::Display for RigError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match *self {
-            Self::OutOfRange { key, value, min, max } => {
-                write!(f, "{key} = {value}: expected a value from {min} to {max}")
-            }
-            Self::StepOrder { step, position_mm, least_mm } => write!(
-                f,
-                "rig.step_positions_mm: step {step} is at {position_mm} mm, expected at least {least_mm:.1} mm: the wheel has to finish one step before it touches the next"
-            ),
-            Self::StepBeyondTravel { step, position_mm, travel_mm } => write!(
-                f,
-                "rig.step_positions_mm: step {step} is at {position_mm} mm, expected at most {travel_mm} mm, which is rig.travel_mm"
-            ),
-            Self::Pair { upper: (upper, value), lower: (lower, other), ratio } => write!(
-                f,
-                "{upper} = {value}: expected at least {:.1}, as {lower} = {other}",
-                other * ratio
-            ),
-            Self::Unable { value, bound, reason, keys } => {
-                let key = keys.first().unwrap_or(&"rig");
-                write!(f, "{key} = {value}: expected {bound}: {reason}")
-            }
-            Self::OutOfReach { radius_mm, min_mm, max_mm } => write!(
-                f,
-                "rig.arm_length_mm: the arm reaches wheel-centre radii from {min_mm:.1} to {max_mm:.1} mm, expected to include {radius_mm:.1} mm"
-            ),
-        }
-    }
-}
-
-impl core::error::Error for RigError {}
 
 impl RigError {
     /// The keys that take part, the one that its text begins with first.
@@ -240,12 +223,12 @@ impl Rig {
             ("tread.k_inf_pa_per_m", self.tread.k_inf_pa_per_m, 1e7, 5e10),
             ("tread.stiffening", self.tread.stiffening, 1.0, 20.0),
             ("tread.tau_s", self.tread.tau_s, 1e-3, 10.0),
+            ("tread.thickness_mm", self.tread.thickness_mm, 3.0, 16.0),
             ("plant.mu", self.plant.mu, 0.0, 3.0),
             ("plant.top_load_n", self.plant.top_load_n, 0.0, 200.0),
             ("plant.top_load_share", self.plant.top_load_share, 0.0, 1.0),
             ("plant.moved_mass_kg", self.plant.moved_mass_kg, 0.01, 100.0),
             ("plant.arm_coupling", self.plant.arm_coupling, -1.0, 1.0),
-            ("plant.elastic_creep", self.plant.elastic_creep, 1e-4, 0.2),
             ("preload.cruise_n", self.preload.cruise_n, 5.0, 180.0),
             ("preload.limit_n", self.preload.limit_n, 5.0, 180.0),
             ("preload.spring_n_per_mm", self.preload.spring_n_per_mm, 0.1, 20.0),
@@ -254,7 +237,7 @@ impl Rig {
             ("preload.lag_s", self.preload.lag_s, 0.005, 1.0),
             ("drive.no_load_speed_mm_s", self.drive.no_load_speed_mm_s, 5.0, 300.0),
             ("drive.stall_force_n", self.drive.stall_force_n, 5.0, 5000.0),
-            ("drive.force_limit_n", self.drive.force_limit_n, 5.0, 1000.0),
+            ("drive.force_limit_n", self.drive.force_limit_n, 5.0, 400.0),
             ("drive.reflected_mass_kg", self.drive.reflected_mass_kg, 0.1, 1000.0),
             ("drive.cruise_speed_mm_s", self.drive.cruise_speed_mm_s, 3.0, 100.0),
             ("drive.min_crossing_speed_mm_s", self.drive.min_crossing_speed_mm_s, 0.5, 20.0),

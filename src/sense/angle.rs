@@ -31,11 +31,9 @@ pub const fn is_flagged(frame: AngleFrame) -> bool {
 ///
 /// # Errors
 /// As [`decode`]: the frame says nothing.
-pub const fn field(diagnostics: AngleFrame) -> Result<bool, Reason> {
-    match decode(diagnostics) {
-        Ok(bits) => Ok(bits & (COMPENSATED | OVERFLOW | TOO_STRONG | TOO_WEAK) == COMPENSATED),
-        Err(reason) => Err(reason),
-    }
+pub fn field(diagnostics: AngleFrame) -> Result<bool, Reason> {
+    let confirms = COMPENSATED | OVERFLOW | TOO_STRONG | TOO_WEAK;
+    decode(diagnostics).map(|bits| bits & confirms == COMPENSATED)
 }
 
 /// The 14-bit code of a frame with even parity and without the error flag, bit 14.

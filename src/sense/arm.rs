@@ -7,8 +7,7 @@ use crate::numeric::{between, checked, reciprocal_of_normalised, sin_cos};
 use crate::rig::{MAX_STEPS, Rig, RigError};
 use crate::units::{Millimetres, Q16, Ratio, q16};
 
-/// Least and largest sine of a plausible arm angle; the parameters are checked against 0.1 to
-/// 0.9.
+/// Least and largest sine of a plausible arm angle; parameters keep to 0.1 to 0.9.
 const SINE: (f64, f64) = (0.05, 0.95);
 
 /// Distance from a level at which the next one is reported, steps: a tenth of a step (0.4 mm,

@@ -14,37 +14,14 @@ use crate::units::{
     Tick, Travel, q16,
 };
 
-/// Time constant of the low-pass of preload and compression sensor, s. Chosen: reduces a
+/// Time constant of the low-pass of preload, compression and arm angle sensor, s. Chosen: reduces a
 /// millisecond's noise to a third and costs the preload loop 5 ms beside the 140 ms of its
-/// actuator; equal, so that both see a crossing with the same lag.
-const FILTER_S: f64 = 0.005;
+/// actuator; equal, so that all see a crossing with the same lag. A code of the arm angle is
+/// 0.04 mm of radius: 5 ms smooths the staircase of a climb (3 mm/s, a code every 13 ms) and lags
+/// it by 0.015 mm.
+pub const FILTER_S: f64 = 0.005;
 /// The same as machine units, s: by so much a filtered ramp is late.
 pub const FILTER_LAG: Seconds = q16(5_000);
-
-/// Choices of the filters; the defaults hold for both rigs.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Tuning {
-    /// Bandwidth of the speed observer, rad/s.
-    pub speed_bandwidth_rad_s: f64,
-    /// Low-pass of the preload sensor, s.
-    pub preload_sensor_tau_s: f64,
-    /// Low-pass of the compression sensor, s.
-    pub tread_tau_s: f64,
-    /// Low-pass of the arm angle, s. A code is 0.04 mm of radius; 5 ms smooths the
-    /// staircase of a climb (3 mm/s, a code every 13 ms) and lags it by 0.015 mm.
-    pub arm_tau_s: f64,
-}
-
-impl Default for Tuning {
-    fn default() -> Self {
-        Self {
-            speed_bandwidth_rad_s: speed::BANDWIDTH_RAD_S,
-            preload_sensor_tau_s: FILTER_S,
-            tread_tau_s: FILTER_S,
-            arm_tau_s: FILTER_S,
-        }
-    }
-}
 
 /// The four sensors in machine units.
 #[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -83,8 +60,7 @@ pub struct SensedState {
     pub compression: Reading<Millimetres>,
     /// The same through its low-pass, mm.
     pub compression_filtered: Millimetres,
-    /// Wheel centre's distance from the pillar axis, mm, through the low-pass of
-    /// the angle.
+    /// Wheel centre's distance from the pillar axis, mm, by the low-pass of the angle.
     pub radius: Reading<Millimetres>,
     /// Tangent of the arm angle.
     pub tan_arm: Ratio,
@@ -97,26 +73,31 @@ pub struct SensedState {
 impl Senses {
     /// The sensors of `rig` with the default filters.
     pub fn try_build(rig: &Rig) -> Result<Self, RigError> {
-        Self::try_build_tuned(rig, &Tuning::default())
+        Self::try_build_with(rig, speed::BANDWIDTH_RAD_S, FILTER_S)
     }
 
-    /// The sensors of `rig` with chosen filters.
+    /// The sensors of `rig` with a speed observer of this bandwidth, rad/s, and a low-pass of this
+    /// time constant, s, for the others.
     #[allow(clippy::float_arithmetic, reason = "SI to machine units, once at start")]
-    pub fn try_build_tuned(rig: &Rig, tuning: &Tuning) -> Result<Self, RigError> {
+    pub fn try_build_with(
+        rig: &Rig,
+        bandwidth_rad_s: f64,
+        filter_s: f64,
+    ) -> Result<Self, RigError> {
         let arm = Arm::try_build(rig)?;
         Ok(Self {
-            wheel_encoder: Speedometer::try_build(rig, tuning.speed_bandwidth_rad_s)?,
+            wheel_encoder: Speedometer::try_build(rig, bandwidth_rad_s)?,
             preload_sensor: AnalogChannel::try_build(
                 "sense.preload_full_scale_n",
                 rig.sense.preload_full_scale_n,
-                tuning.preload_sensor_tau_s,
+                filter_s,
             )?,
             compression_sensor: AnalogChannel::try_build(
                 "sense.tread_full_scale_mm",
                 rig.sense.tread_full_scale_mm,
-                tuning.tread_tau_s,
+                filter_s,
             )?,
-            arm_angle: AngleSensor::build(rig.sense.angle_zero_code, arm.reach, tuning.arm_tau_s),
+            arm_angle: AngleSensor::build(rig.sense.angle_zero_code, arm.reach, filter_s),
             arm,
             limit: libm::round(rig.sense.stale_after_s * f64::from(TICK_HZ)) as u32,
         })
@@ -171,12 +152,8 @@ impl Senses {
 impl SensedState {
     /// Validity of wheel encoder, preload sensor, compression sensor and arm angle.
     pub const fn validities(&self) -> [Validity; 4] {
-        [
-            self.speed.validity,
-            self.preload.validity,
-            self.compression.validity,
-            self.radius.validity,
-        ]
+        let Self { speed, preload, compression, radius, .. } = self;
+        [speed.validity, preload.validity, compression.validity, radius.validity]
     }
 
     /// The same, to be set.

@@ -32,7 +32,7 @@ pub const fn of_mode(mode: Mode) -> u8 {
 /// The mode of a number; none if the number has no meaning.
 pub fn mode(number: u8) -> Option<Mode> {
     let held = || Fault::ALL.into_iter().find(|fault| fault.code() == u16::from(number));
-    let plain = Mode::WITHOUT_FAULT.get(usize::from(number)).copied();
+    let plain = Mode::WITHOUT_FAULT.get(usize::from(number)).map(|(mode, _)| *mode);
     plain.or_else(|| held().map(Mode::FaultHold))
 }
 
@@ -63,7 +63,7 @@ mod tests {
         for known in Mode::all() {
             assert_eq!(mode(of_mode(known)), Some(known));
         }
-        let places = Mode::WITHOUT_FAULT.into_iter().map(of_mode);
+        let places = Mode::WITHOUT_FAULT.map(|(mode, _)| of_mode(mode)).into_iter();
         assert!(places.eq(0..Mode::WITHOUT_FAULT.len() as u8));
         let known = (0..=u8::MAX).filter(|number| mode(*number).is_some()).count();
         assert_eq!(known, Mode::all().count());

@@ -4,6 +4,7 @@
 
 #![deny(clippy::float_arithmetic)]
 
+use super::Observed;
 use crate::fault::Fault;
 use crate::numeric::checked;
 use crate::rig::{Rig, RigError, SHORT_PART, START_LAG_MM};
@@ -56,8 +57,7 @@ const STRAYED_TICKS: u16 = 10;
 const STUCK: u16 = 64;
 /// Ticks of rest over which the changes of a code are counted: fewer than the self-test's.
 const NOISE_TICKS: u16 = 64;
-/// Chance of a run of equal codes that counts as stuck, as the negative of its natural logarithm:
-/// 1e-12.
+/// Chance of a run of equal codes that counts as stuck, as -ln: 1e-12.
 const RARE: u16 = 28;
 /// Change within a tick that no force can make, N: the spring yields 36 N/s at cruise speed.
 const JUMP_N: Newtons = q16(4_000_000);
@@ -106,9 +106,9 @@ impl Default for CodeNoise {
 
 impl Noise {
     /// A tick in which both bridges are off.
-    pub(super) fn rest(&mut self, seen: &Compared) {
-        self.preload.rest(seen.preload);
-        self.compression.rest(seen.compression);
+    pub(super) fn rest(&mut self, seen: &Observed<'_>) {
+        self.preload.rest(seen.sensed.preload.value);
+        self.compression.rest(seen.sensed.compression.value);
     }
 }
 
@@ -147,7 +147,7 @@ pub(super) struct CrossState {
     past: [Millimetres; 2 * SPAN],
     held: usize,
     at: Tick,
-    /// Encoder and reference at the last progress.
+    /// Travel and reference at the last progress.
     progress: (Travel, Travel),
     /// Number of progresses, up to [`TURNED`].
     turned: u8,
@@ -167,31 +167,6 @@ struct CodeState {
     /// Preload that was due at the last change, N.
     due: Newtons,
     erratic: u8,
-}
-
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Compared {
-    /// Tick.
-    pub(super) now: Tick,
-    /// When the encoder was read.
-    pub(super) read_at: Tick,
-    /// Travel by the encoder.
-    pub(super) travel: Travel,
-    /// Wheel centre's distance from the pillar axis, mm.
-    pub(super) radius: Millimetres,
-    /// Preload, N.
-    pub(super) preload: Newtons,
-    /// Preload that the actuator should have reached by now, N.
-    pub(super) preload_due: Newtons,
-    /// Preload beyond that and what the spring's own motion makes, N.
-    pub(super) preload_off: Newtons,
-    /// Compression of the tread, mm.
-    pub(super) compression: Millimetres,
-    /// Speed reference, signed outwards, mm/s.
-    pub(super) speed_ref: MillimetresPerSecond,
-    /// Duty that the speed loop adds to its feed-forward, if the reference is steady and the
-    /// wheel on the continuous wall.
-    pub(super) effort: Option<Ratio>,
 }
 
 /// Distance off its reference within two spans that is a fault, mm.
@@ -227,17 +202,19 @@ impl CrossCheck {
         })
     }
 
-    /// Check of the pre-tightener and its sensor, whenever that is on.
+    /// Check of the pre-tightener and its sensor, whenever that is on. The preload is `off` what
+    /// the actuator should have reached and what the spring's own motion makes, N.
     pub(super) fn preload(
         &self,
         state: &mut CrossState,
         noise: &Noise,
-        seen: &Compared,
+        seen: &Observed<'_>,
+        off: Newtons,
     ) -> Option<Fault> {
         let limits = Limits { stuck: noise.preload.stuck, jump: JUMP_N, due: self.telling() };
-        let unsound = judge(&mut state.preload, seen.preload, seen.preload_due, &limits);
-        let off = seen.preload_off.abs() > self.strayed;
-        let strayed = lasts(&mut state.strayed, off, STRAYED_TICKS);
+        let preload = seen.sensed.preload.value;
+        let unsound = judge(&mut state.preload, preload, seen.preload_due, &limits);
+        let strayed = lasts(&mut state.strayed, off.abs() > self.strayed, STRAYED_TICKS);
         unsound
             .then_some(Fault::PreloadSensorImplausible)
             .or(strayed.then_some(Fault::PretightenerRunaway))
@@ -248,21 +225,23 @@ impl CrossCheck {
         self.strayed.half()
     }
 
-    /// Every check of a tick in which the drive is on.
+    /// Every check of a tick in which the drive is on; `off` as for the pre-tightener.
     pub(super) fn step(
         &self,
         state: &mut CrossState,
         noise: &Noise,
-        seen: &Compared,
+        seen: &Observed<'_>,
+        off: Newtons,
     ) -> Option<Fault> {
         let bent = self.bends(state, seen);
         // Without a new reading the wheel's position is unknown.
-        let fresh = seen.read_at == seen.now;
+        let fresh = seen.sensed.speed.at == seen.now;
         let lags = fresh && self.lags(state, seen);
-        let preload = self.preload(state, noise, seen);
+        let preload = self.preload(state, noise, seen, off);
         let stuck = noise.compression.stuck;
         let limits = Limits { stuck, jump: JUMP_MM, due: self.telling() };
-        let unsound = judge(&mut state.compression, seen.compression, seen.preload_due, &limits);
+        let compression = seen.sensed.compression.value;
+        let unsound = judge(&mut state.compression, compression, seen.preload_due, &limits);
         let arm = fresh && arm_runs_ahead(state, seen);
         let effort = seen.effort.is_some_and(|effort| {
             let along = if seen.speed_ref < Q16::ZERO { -effort } else { effort };
@@ -280,10 +259,10 @@ impl CrossCheck {
 
     /// Whether the wheel leaves its reference: first or second difference of encoder less
     /// reference over 12 ms.
-    fn bends(&self, state: &mut CrossState, seen: &Compared) -> bool {
+    fn bends(&self, state: &mut CrossState, seen: &Observed<'_>) -> bool {
         state.reference = state.reference.wrapping_add(per_tick(seen.speed_ref));
         // A tick without a new reading, or one lost: the times would not be equal.
-        let missed = seen.read_at != seen.now || seen.now.wrapping_sub(state.at) != 1;
+        let missed = seen.sensed.speed.at != seen.now || seen.now.wrapping_sub(state.at) != 1;
         state.at = seen.now;
         if missed {
             state.held = 0;
@@ -299,30 +278,34 @@ impl CrossCheck {
         known && (bend.abs() > self.bent || (now - old).abs() > self.off)
     }
 
-    /// Whether the reference goes on while the wheel does not.
-    fn lags(&self, state: &mut CrossState, seen: &Compared) -> bool {
+    /// Whether the axle falls behind its reference without progress.
+    fn lags(&self, state: &mut CrossState, seen: &Observed<'_>) -> bool {
         let (travel, reference) = state.progress;
-        let moved = Q16::narrow(seen.travel.saturating_sub(travel));
-        if moved.abs() > self.progress {
+        let along = |d: Travel| {
+            let d = Q16::narrow(d);
+            if seen.speed_ref < Q16::ZERO { -d } else { d }
+        };
+        let moved = along(seen.travel.saturating_sub(travel));
+        if moved > self.progress {
             state.progress = (seen.travel, state.reference);
             state.turned = state.turned.saturating_add(1).min(TURNED);
             return false;
         }
         let most = if state.turned < TURNED { self.start_lag } else { self.lag };
-        Q16::narrow(state.reference.saturating_sub(reference)).abs() > most
+        along(state.reference.saturating_sub(reference)) - moved > most
     }
 }
 
-/// Whether the arm has moved farther than the wheel.
-fn arm_runs_ahead(state: &mut CrossState, seen: &Compared) -> bool {
+/// Whether the arm has moved farther than the wheel, and the tread that lets go of its axle.
+fn arm_runs_ahead(state: &mut CrossState, seen: &Observed<'_>) -> bool {
     if state.arm_ticks == 0 {
-        state.arm = (seen.radius, seen.travel);
+        state.arm = (seen.sensed.radius.value, seen.travel);
         state.arm_ticks = ARM_TICKS;
     }
     state.arm_ticks -= 1;
     let (radius, travel) = state.arm;
     let rolled = Q16::narrow(seen.travel.saturating_sub(travel)).abs();
-    (seen.radius - radius).abs() > rolled + ARM_BEYOND
+    (seen.sensed.radius.value - radius).abs() > rolled + seen.wound + ARM_BEYOND
 }
 
 /// Bounds of a sensor's codes.
@@ -361,7 +344,7 @@ pub(super) fn lasts(count: &mut u16, condition: bool, enough: u16) -> bool {
 
 impl CrossState {
     /// Starts with the drive, which has been at rest until now.
-    pub(super) fn begin(&mut self, seen: &Compared) {
+    pub(super) fn begin(&mut self, seen: &Observed<'_>) {
         *self = Self {
             past: [Q16::narrow(seen.travel); 2 * SPAN],
             held: 2 * SPAN,
@@ -371,7 +354,8 @@ impl CrossState {
             preload: self.preload,
             ..Self::default()
         };
-        (self.compression.value, self.compression.due) = (seen.compression, seen.preload_due);
+        self.compression.value = seen.sensed.compression.value;
+        self.compression.due = seen.preload_due;
     }
 }
 

@@ -1,10 +1,68 @@
 //! Each check at its threshold, and within tolerated noise.
 
 use super::*;
+use crate::supervise::Mode;
 use proptest::prelude::*;
 
 /// One count of the prototype's encoder, mm.
 const COUNT_MM: f64 = 2.0 * core::f64::consts::PI * 25.0 / 8192.0;
+
+/// What the checks compare.
+#[derive(Clone, Copy)]
+struct Compared {
+    now: Tick,
+    /// When the encoder was read.
+    read_at: Tick,
+    travel: Travel,
+    radius: Millimetres,
+    preload: Newtons,
+    preload_due: Newtons,
+    preload_off: Newtons,
+    compression: Millimetres,
+    speed_ref: MillimetresPerSecond,
+    effort: Option<Ratio>,
+}
+
+impl Compared {
+    /// What `then` makes of it as the monitor sees it, and of the preload's deviation.
+    fn seen<T>(&self, then: impl FnOnce(&Observed<'_>, Newtons) -> T) -> T {
+        let mut sensed = crate::estimate::sensed(0, 0.0, 0.0);
+        sensed.speed.at = self.read_at;
+        sensed.radius.value = self.radius;
+        sensed.preload.value = self.preload;
+        sensed.compression.value = self.compression;
+        let observed = Observed {
+            now: self.now,
+            mode: Mode::Idle,
+            sensed: &sensed,
+            travel: self.travel,
+            wound: Q16::ZERO,
+            bridges: None,
+            speed_ref: self.speed_ref,
+            preload_due: self.preload_due,
+            effort: self.effort,
+            overrun: false,
+            emergency_stop: false,
+        };
+        then(&observed, self.preload_off)
+    }
+
+    fn step(&self, check: &CrossCheck, state: &mut CrossState) -> Option<Fault> {
+        self.seen(|seen, off| check.step(state, &Noise::default(), seen, off))
+    }
+
+    fn preload(&self, check: &CrossCheck, state: &mut CrossState) -> Option<Fault> {
+        self.seen(|seen, off| check.preload(state, &Noise::default(), seen, off))
+    }
+
+    fn bends(&self, check: &CrossCheck, state: &mut CrossState) -> bool {
+        self.seen(|seen, _| check.bends(state, seen))
+    }
+
+    fn begin(&self, state: &mut CrossState) {
+        self.seen(|seen, _| state.begin(seen));
+    }
+}
 
 /// True state of a drive.
 #[derive(Clone, Copy, Debug)]
@@ -59,10 +117,25 @@ fn found(mut at: impl FnMut(f64) -> Rolls) -> Option<(Fault, i32)> {
         };
         if tick == 0 {
             state.preload.value = seen.preload;
-            state.begin(&seen);
+            seen.begin(&mut state);
         }
-        check.step(&mut state, &Noise::default(), &seen).map(|fault| (fault, tick - 100))
+        seen.step(&check, &mut state).map(|fault| (fault, tick - 100))
     })
+}
+
+/// As of an encoder that sticks on a corner: the tread winds up, so that the axle seems to go back.
+#[test]
+fn an_axle_that_recedes_makes_no_progress() {
+    let recedes = |back: f64| {
+        found(|t| {
+            let (before, late) = (20.0 * (t.min(0.0) + 0.1), t.max(0.0));
+            Rolls { travel: before - back * late, reference: before + 2.0 * late, ..ROLLS }
+        })
+    };
+    for (back, within) in [(0.0, 240), (1.6, 140)] {
+        let (fault, after) = recedes(back).expect("found");
+        assert!(fault == Fault::DriveStalled && after < within, "{back}: {fault:?} {after} ms");
+    }
 }
 
 /// A wheel at constant speed, mm/s, that leaves it with this acceleration, mm/s^2.
@@ -95,9 +168,9 @@ fn a_bridge_at_full_duty_from_the_first_tick_is_found_as_soon() {
         let travel = (0.5 * 1700.0 * t * t / COUNT_MM).floor() * COUNT_MM;
         let seen = Compared { travel: Travel::from_num(travel), ..off_by(tick, Q16::ZERO) };
         if tick == 0 {
-            state.begin(&seen);
+            seen.begin(&mut state);
         }
-        check.step(&mut state, &Noise::default(), &seen) == Some(Fault::DriveRunaway)
+        seen.step(&check, &mut state) == Some(Fault::DriveRunaway)
     });
     assert!(found.is_some_and(|tick| tick <= 10), "{found:?}");
 }
@@ -287,8 +360,8 @@ proptest! {
                 speed_ref: Q16::from_bits(speed_ref),
                 effort: Some(Q16::from_bits(effort)),
             };
-            check.step(&mut state, &Noise::default(), &seen);
-            check.preload(&mut state, &Noise::default(), &seen);
+            seen.step(&check, &mut state);
+            seen.preload(&check, &mut state);
         }
     }
 }
@@ -313,8 +386,8 @@ fn off_by(now: Tick, off: Millimetres) -> Compared {
 fn rested() -> (CrossCheck, CrossState) {
     let check = CrossCheck::try_build(&Rig::prototype()).expect("a sound rig");
     let mut state = CrossState::default();
-    state.begin(&off_by(0, Q16::ZERO));
-    assert!((0..=100).all(|tick| !check.bends(&mut state, &off_by(tick, Q16::ZERO))));
+    off_by(0, Q16::ZERO).begin(&mut state);
+    assert!((0..=100).all(|tick| !off_by(tick, Q16::ZERO).bends(&check, &mut state)));
     (check, state)
 }
 
@@ -325,12 +398,12 @@ fn across_a_missing_reading_no_distance_is_judged() {
     let old = Compared { read_at: 100, ..off_by(101, far) };
     for gap in [old, off_by(102, far)] {
         let (check, mut state) = rested();
-        assert!(!check.bends(&mut state, &gap));
+        assert!(!gap.bends(&check, &mut state));
         for tick in 1..100 {
-            assert!(!check.bends(&mut state, &off_by(gap.now + tick, far)), "{tick}");
+            assert!(!off_by(gap.now + tick, far).bends(&check, &mut state), "{tick}");
         }
         // From then on it is again.
-        assert!(check.bends(&mut state, &off_by(gap.now + 100, Q16::ZERO)));
+        assert!(off_by(gap.now + 100, Q16::ZERO).bends(&check, &mut state));
     }
 }
 
@@ -349,7 +422,7 @@ fn of_what_shows_in_one_tick_the_arm_is_named_before_the_wheel_that_stands() {
     let moves = |by: i32| (seen.radius - Q16::from_num(by), seen.travel);
     for (by, named) in [(0, Fault::DriveStalled), (1, Fault::ArmMismatch)] {
         let mut state = CrossState { arm: moves(by), arm_ticks: 10, ..stands.clone() };
-        assert_eq!(check.step(&mut state, &Noise::default(), &seen), Some(named));
+        assert_eq!(seen.step(&check, &mut state), Some(named));
     }
 }
 
@@ -361,7 +434,7 @@ fn off_by_exactly_the_threshold_is_tolerated() {
         let mut past = [Q16::ZERO; 2 * SPAN];
         past[SPAN] = distance.half();
         let mut state = CrossState { past, held: 2 * SPAN, ..CrossState::default() };
-        check.bends(&mut state, &off_by(1, distance))
+        off_by(1, distance).bends(&check, &mut state)
     };
     let off = check.off;
     assert!(!drifts(off) && !drifts(-off));
@@ -370,7 +443,7 @@ fn off_by_exactly_the_threshold_is_tolerated() {
         let mut state = CrossState::default();
         let at = off_by(1, Q16::ZERO);
         let seen = Compared { preload: at.preload_due + off, preload_off: off, ..at };
-        (0..50).find_map(|_| check.preload(&mut state, &Noise::default(), &seen))
+        (0..50).find_map(|_| seen.preload(&check, &mut state))
     };
     assert_eq!(strays(check.strayed), None);
     assert_eq!(strays(-check.strayed), None);
@@ -388,15 +461,14 @@ fn a_preload_astray_before_the_drive_starts_is_counted_on() {
         preload_off: q16(15_000_000),
         ..off_by(tick, Q16::ZERO)
     };
-    let (before, noise) = (STRAYED_TICKS - 3, Noise::default());
+    let before = STRAYED_TICKS - 3;
     let mut state = CrossState::default();
     for tick in 0..Tick::from(before) {
         let seen = astray(tick);
-        assert_eq!(check.preload(&mut state, &noise, &seen), None);
+        assert_eq!(seen.preload(&check, &mut state), None);
     }
-    state.begin(&astray(Tick::from(before)));
+    astray(Tick::from(before)).begin(&mut state);
     let start = Tick::from(before);
-    let found: Vec<_> =
-        (start..start + 3).map(|t| check.step(&mut state, &noise, &astray(t))).collect();
+    let found: Vec<_> = (start..start + 3).map(|t| astray(t).step(&check, &mut state)).collect();
     assert_eq!(found, [None, None, Some(Fault::PretightenerRunaway)]);
 }

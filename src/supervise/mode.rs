@@ -1,19 +1,20 @@
 //! Modes of the drive, and the operator's commands.
 
-use crate::fault::Fault;
+use super::codes;
+use crate::fault::{Fault, worded};
 use crate::units::Direction;
 
-/// An operator's command.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-pub enum Command {
+worded! {
+    /// An operator's command.
+    Command, word:
     /// Deploy from where the wheel is.
-    Start,
+    Start "start";
     /// Come to rest and hold.
-    Stop,
+    Stop "stop";
     /// Retract from where the wheel is.
-    Retract,
+    Retract "retract";
     /// Leave the fault hold, or zero the sensors again when idle at the stow end.
-    Reset,
+    Reset "reset";
 }
 
 /// Part of a run between two steps.
@@ -56,80 +57,45 @@ pub enum Mode {
     Service,
 }
 
-impl Command {
-    /// Every command.
-    pub const ALL: [Self; 4] = [Self::Start, Self::Stop, Self::Retract, Self::Reset];
-
-    /// Its name, as the logs have it.
-    pub const fn word(self) -> &'static str {
-        match self {
-            Self::Start => "start",
-            Self::Stop => "stop",
-            Self::Retract => "retract",
-            Self::Reset => "reset",
-        }
-    }
-}
-
 impl Mode {
-    /// Every mode but the fault holds, of which there is one per [`Fault`].
-    pub const WITHOUT_FAULT: [Self; 19] = {
+    /// Every mode but the fault holds, of which there is one per [`Fault`], and its words, as the
+    /// logs have them.
+    pub const WITHOUT_FAULT: [(Self, &str); 19] = {
         use Direction::{Deploy, Retract};
         use Leg::{Approach, Crossing, Cruise, Settle};
         [
-            Self::Boot,
-            Self::SelfTest,
-            Self::Zero,
-            Self::Idle,
-            Self::Preload(Deploy),
-            Self::Run(Deploy, Cruise),
-            Self::Run(Deploy, Approach),
-            Self::Run(Deploy, Crossing),
-            Self::Run(Deploy, Settle),
-            Self::Stopping(Deploy),
-            Self::Complete(Deploy),
-            Self::Preload(Retract),
-            Self::Run(Retract, Cruise),
-            Self::Run(Retract, Approach),
-            Self::Run(Retract, Crossing),
-            Self::Run(Retract, Settle),
-            Self::Stopping(Retract),
-            Self::Complete(Retract),
-            Self::Service,
+            (Self::Boot, "boot"),
+            (Self::SelfTest, "self-test"),
+            (Self::Zero, "zeroing"),
+            (Self::Idle, "idle"),
+            (Self::Preload(Deploy), "preloading to deploy"),
+            (Self::Run(Deploy, Cruise), "deploying: cruise"),
+            (Self::Run(Deploy, Approach), "deploying: approach"),
+            (Self::Run(Deploy, Crossing), "deploying: crossing"),
+            (Self::Run(Deploy, Settle), "deploying: settle"),
+            (Self::Stopping(Deploy), "stopping while deploying"),
+            (Self::Complete(Deploy), "deployed"),
+            (Self::Preload(Retract), "preloading to retract"),
+            (Self::Run(Retract, Cruise), "retracting: cruise"),
+            (Self::Run(Retract, Approach), "retracting: approach"),
+            (Self::Run(Retract, Crossing), "retracting: crossing"),
+            (Self::Run(Retract, Settle), "retracting: settle"),
+            (Self::Stopping(Retract), "stopping while retracting"),
+            (Self::Complete(Retract), "retracted"),
+            (Self::Service, "service"),
         ]
     };
 
     /// Every mode.
     #[cfg(test)]
     pub(super) fn all() -> impl Iterator<Item = Self> {
-        Self::WITHOUT_FAULT.into_iter().chain(Fault::ALL.map(Self::FaultHold))
+        Self::WITHOUT_FAULT.map(|(mode, _)| mode).into_iter().chain(Fault::ALL.map(Self::FaultHold))
     }
 
     /// The mode in words, as the logs have it.
-    pub const fn words(self) -> &'static str {
-        use Direction::{Deploy, Retract};
-        match self {
-            Self::Boot => "boot",
-            Self::SelfTest => "self-test",
-            Self::Zero => "zeroing",
-            Self::Idle => "idle",
-            Self::Preload(Deploy) => "preloading to deploy",
-            Self::Preload(Retract) => "preloading to retract",
-            Self::Run(Deploy, Leg::Cruise) => "deploying: cruise",
-            Self::Run(Deploy, Leg::Approach) => "deploying: approach",
-            Self::Run(Deploy, Leg::Crossing) => "deploying: crossing",
-            Self::Run(Deploy, Leg::Settle) => "deploying: settle",
-            Self::Run(Retract, Leg::Cruise) => "retracting: cruise",
-            Self::Run(Retract, Leg::Approach) => "retracting: approach",
-            Self::Run(Retract, Leg::Crossing) => "retracting: crossing",
-            Self::Run(Retract, Leg::Settle) => "retracting: settle",
-            Self::Stopping(Deploy) => "stopping while deploying",
-            Self::Stopping(Retract) => "stopping while retracting",
-            Self::Complete(Deploy) => "deployed",
-            Self::Complete(Retract) => "retracted",
-            Self::FaultHold(_) => "fault hold",
-            Self::Service => "service",
-        }
+    pub fn words(self) -> &'static str {
+        let number = usize::from(codes::of_mode(self));
+        Self::WITHOUT_FAULT.get(number).map_or("fault hold", |(_, words)| words)
     }
 
     /// Whether nothing is driven in this mode, neither wheel nor pre-tightener.

@@ -3,7 +3,7 @@
 #![deny(clippy::float_arithmetic)]
 
 use super::Mode;
-use super::crosscheck::{Compared, CrossCheck, CrossState, Noise, lasts};
+use super::crosscheck::{CrossCheck, CrossState, Noise, lasts};
 use super::readback::{Readback, ReadbackState};
 use crate::control::preload_loop::answer_s;
 use crate::fault::Fault;
@@ -12,7 +12,7 @@ use crate::rig::{OVERPRESSURE_PART, Rig, RigError};
 use crate::sense::raw::BridgeCodes;
 use crate::sense::{Reason, SensedState, Validity};
 use crate::units::{
-    Duty, Millimetres, MillimetresPerSecond, Newtons, Q16, Ratio, TICK_HZ, Tick, q16,
+    Duty, Millimetres, MillimetresPerSecond, Newtons, Q16, Ratio, TICK_HZ, Tick, Travel, q16,
 };
 
 /// Ticks that overpressure must last, longer than noise.
@@ -65,6 +65,10 @@ pub struct Observed<'a> {
     pub mode: Mode,
     /// Sensors.
     pub sensed: &'a SensedState,
+    /// Travel that the drive is asked for, by the axle.
+    pub travel: Travel,
+    /// How far the tread is wound up, mm.
+    pub wound: Millimetres,
     /// Readback of the bridges since the last tick.
     pub bridges: Option<BridgeCodes>,
     /// Speed reference, signed, mm/s.
@@ -155,34 +159,21 @@ impl Monitor {
         &self,
         state: &mut MonitorState,
         seen: &Observed<'_>,
-        preload_off: Newtons,
+        off: Newtons,
     ) -> Option<Fault> {
-        let sensed = seen.sensed;
-        let compared = Compared {
-            now: seen.now,
-            read_at: sensed.speed.at,
-            travel: sensed.travel,
-            radius: sensed.radius.value,
-            preload: sensed.preload.value,
-            preload_due: seen.preload_due,
-            preload_off,
-            compression: sensed.compression.value,
-            speed_ref: seen.speed_ref,
-            effort: seen.effort,
-        };
         let before = core::mem::replace(&mut state.driving, seen.mode.moves());
         if state.driving {
             if !before {
-                state.cross.begin(&compared);
+                state.cross.begin(seen);
             }
-            self.cross.step(&mut state.cross, &state.noise, &compared)
+            self.cross.step(&mut state.cross, &state.noise, seen, off)
         } else if matches!(seen.mode, Mode::Preload(_)) {
-            self.cross.preload(&mut state.cross, &state.noise, &compared)
+            self.cross.preload(&mut state.cross, &state.noise, seen, off)
         } else {
             state.cross = CrossState::default();
             // A motion of the service mode is no noise.
             if seen.mode != Mode::Service {
-                state.noise.rest(&compared);
+                state.noise.rest(seen);
             }
             None
         }

@@ -56,6 +56,8 @@ fn observed(mode: Mode, sensed: &SensedState) -> Observed<'_> {
         now: 0,
         mode,
         sensed,
+        travel: sensed.travel,
+        wound: Q16::ZERO,
         bridges: Some(IDLE),
         speed_ref: Q16::ZERO,
         preload_due: Q16::ZERO,

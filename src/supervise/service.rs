@@ -50,10 +50,8 @@ impl ServiceDuties {
     /// Whether the service mode carries this out: one motor at a time, within its bound.
     pub const fn is_allowed(self) -> bool {
         let (drive, pretightener) = (self.drive.to_bits(), self.pretightener.to_bits());
-        drive >= -DRIVE_DUTY
-            && drive <= DRIVE_DUTY
-            && pretightener >= -PRELOAD_DUTY
-            && pretightener <= PRELOAD_DUTY
+        drive.unsigned_abs() <= DRIVE_DUTY.unsigned_abs()
+            && pretightener.unsigned_abs() <= PRELOAD_DUTY.unsigned_abs()
             && (drive == 0 || pretightener == 0)
     }
 

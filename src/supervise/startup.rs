@@ -21,9 +21,9 @@ pub fn silent(sensed: &SensedState) -> Option<Fault> {
     sensor_fault(sensed, false)
 }
 
-/// Whether the wheel rests.
-pub fn at_rest(sensed: &SensedState) -> bool {
-    sensed.speed.value.abs() < REST
+/// Whether a wheel of this speed rests, mm/s.
+pub fn at_rest(speed: MillimetresPerSecond) -> bool {
+    speed.abs() < REST
 }
 
 /// Whether the wheel lies unloaded on the outermost wall, so that zeros can be taken. A preload
@@ -87,7 +87,7 @@ mod tests {
         for (speed, expected) in
             [(0.0, true), (0.49, true), (-0.49, true), (0.5, false), (-0.5, false)]
         {
-            assert_eq!(at_rest(&sensed(0, speed, 0.0, 0.0)), expected, "{speed}");
+            assert_eq!(at_rest(Q16::from_num(speed)), expected, "{speed}");
         }
     }
 

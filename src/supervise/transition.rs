@@ -32,28 +32,6 @@ pub enum Trigger {
     Fault(Fault),
 }
 
-impl Trigger {
-    /// Every trigger but the faults, of which there is one per [`Fault`].
-    pub const WITHOUT_FAULT: [Self; 16] = [
-        Self::SensorsAnswer,
-        Self::TestPassed { stowed: true },
-        Self::TestPassed { stowed: false },
-        Self::Zeroed,
-        Self::Command(Command::Start),
-        Self::Command(Command::Stop),
-        Self::Command(Command::Retract),
-        Self::Command(Command::Reset),
-        Self::PreloadReached,
-        Self::Leg(Leg::Cruise),
-        Self::Leg(Leg::Approach),
-        Self::Leg(Leg::Crossing),
-        Self::Leg(Leg::Settle),
-        Self::AtRest,
-        Self::Arrived,
-        Self::Service,
-    ];
-}
-
 /// The mode after `trigger` in `mode`; none if the mode ignores it. A fault leads to the fault
 /// hold from every mode, and the first fault is kept. During motion, start and retract mean
 /// stop. The service mode is entered from idle alone, by the host's line alone; every command leads
@@ -92,7 +70,15 @@ mod tests {
     use super::*;
 
     fn triggers() -> impl Iterator<Item = Trigger> {
-        Trigger::WITHOUT_FAULT.into_iter().chain(Fault::ALL.map(Trigger::Fault))
+        let legs = [Leg::Cruise, Leg::Approach, Leg::Crossing, Leg::Settle].map(Trigger::Leg);
+        let passed = [true, false].map(|stowed| Trigger::TestPassed { stowed });
+        [Trigger::SensorsAnswer, Trigger::Zeroed, Trigger::PreloadReached]
+            .into_iter()
+            .chain([Trigger::AtRest, Trigger::Arrived, Trigger::Service])
+            .chain(passed)
+            .chain(legs)
+            .chain(Command::ALL.map(Trigger::Command))
+            .chain(Fault::ALL.map(Trigger::Fault))
     }
 
     /// Every mode with every trigger.

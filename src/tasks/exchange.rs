@@ -165,13 +165,10 @@ impl Exchange {
 
     /// What the light shows, as of the latest tick.
     pub fn light(&self) -> Light {
-        use Mode::{
-            Boot, Complete, FaultHold, Idle, Preload, Run, SelfTest, Service, Stopping, Zero,
-        };
         match self.telemetry().map(|row| row.mode) {
-            None | Some(Boot | SelfTest | Zero | Idle | Complete(_)) => Light::Off,
-            Some(Preload(_) | Run(..) | Stopping(_) | Service) => Light::On,
-            Some(FaultHold(_)) => Light::Alarm,
+            Some(Mode::FaultHold(_)) => Light::Alarm,
+            Some(mode) if !mode.is_at_rest() => Light::On,
+            _ => Light::Off,
         }
     }
 

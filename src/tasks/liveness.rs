@@ -152,7 +152,7 @@ mod tests {
     fn one_silent_task_is_enough() {
         let liveness = Liveness::new();
         assert!(liveness.missed(CHECK_IN_TICKS).is_nobody(), "since boot");
-        assert_eq!(liveness.missed(CHECK_IN_TICKS + 1).bits(), 0x3F);
+        assert_eq!(liveness.missed(CHECK_IN_TICKS + 1).0, 0x3F);
         let operators = [liveness.enrol_operator(), liveness.enrol_operator()];
         let tasks: Vec<_> = always().chain(operators).collect();
         for silent in &tasks {

@@ -9,7 +9,7 @@ use crate::estimate::vibration::VibrationObserver;
 use crate::model::profile::Profile;
 use crate::numeric::checked;
 use crate::rig::{CLIMB_PART, Rig, RigError};
-use crate::sense::{Senses, Tuning};
+use crate::sense::{FILTER_S, Senses};
 use crate::supervise::Monitor;
 use crate::units::TICK_HZ;
 
@@ -22,10 +22,9 @@ impl Controller {
     /// not fit the others.
     pub fn try_build(rig: &Rig) -> Result<Self, RigError> {
         rig.validate()?;
-        let tuning = Tuning { speed_bandwidth_rad_s: OBSERVER_RAD_S, ..Tuning::default() };
         let (preload, load) = (&rig.preload, rig.plant.top_load_n * rig.plant.top_load_share);
         Ok(Self {
-            senses: Senses::try_build_tuned(rig, &tuning)?,
+            senses: Senses::try_build_with(rig, OBSERVER_RAD_S, FILTER_S)?,
             monitor: Monitor::try_build(rig)?,
             estimator: Estimator::try_build(rig)?,
             vibration: VibrationObserver::try_build(rig)?,

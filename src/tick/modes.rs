@@ -53,8 +53,9 @@ impl Controller {
     }
 
     fn begin_run(&self, state: &mut State, tick: &mut TickContext<'_>, direction: Direction) {
+        let load = self.load_of(state);
         let (found, on_corner) =
-            self.estimator.begin_run(&mut state.estimate, tick.sensed, tick.now, direction);
+            self.estimator.begin_run(&mut state.estimate, tick.sensed, tick.now, direction, load);
         if on_corner {
             // The drive has been off: without the corner's full feed-forward the wheel would roll
             // off before the speed loop reacts.
@@ -66,17 +67,18 @@ impl Controller {
     /// Checks the condition of the present mode.
     pub(super) fn advance_mode(&self, state: &mut State, tick: &mut TickContext<'_>) {
         state.in_mode = state.in_mode.saturating_add(1);
+        let rests = at_rest(state.estimate.turns(tick.sensed).1);
         match state.mode {
             Mode::Boot => match silent(tick.sensed) {
                 None => tick.trigger(Trigger::SensorsAnswer),
                 Some(fault) if state.in_mode >= BOOT_TICKS => tick.fail(fault),
                 Some(_) => {}
             },
-            Mode::SelfTest => self.await_rest(state, tick),
+            Mode::SelfTest => self.await_rest(state, tick, rests),
             Mode::Zero => self.await_zero(state, tick),
             Mode::Preload(direction) => self.await_preload(state, tick, direction),
             Mode::Run(direction, _) => self.await_arrival(state, tick, direction),
-            Mode::Stopping(_) if state.profile.speed() == Q16::ZERO && at_rest(tick.sensed) => {
+            Mode::Stopping(_) if state.profile.speed() == Q16::ZERO && rests => {
                 tick.trigger(Trigger::AtRest);
             }
             Mode::Stopping(_) if state.in_mode >= STOP_TICKS => tick.fail(Fault::DriveRunaway),
@@ -84,8 +86,8 @@ impl Controller {
         }
     }
 
-    fn await_rest(&self, state: &mut State, tick: &mut TickContext<'_>) {
-        state.condition_ticks = if at_rest(tick.sensed) { state.condition_ticks + 1 } else { 0 };
+    fn await_rest(&self, state: &mut State, tick: &mut TickContext<'_>, rests: bool) {
+        state.condition_ticks = if rests { state.condition_ticks + 1 } else { 0 };
         if state.condition_ticks >= TEST_TICKS {
             let pressed = self.estimator.means(tick.sensed.compression_filtered);
             let stowed = stowed(tick.sensed, pressed, self.senses.preload_zero_limit());

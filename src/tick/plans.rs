@@ -143,7 +143,7 @@ fn record(tick: &mut TickContext<'_>, open: &OpenCrossing, outcome: &Outcome) {
         gap_predicted: outcome.gap_predicted,
         gap_measured: open.gap,
         height: open.height,
-        slip: open.slip.lost,
+        slip: open.slip.lost + open.slip.beside,
         lead_time: lead_time(open, point.at),
         slip_margin: outcome.slip_margin,
         stiffness_scale: outcome.learned.scale,

@@ -3,7 +3,7 @@
 use super::{Controller, Event, State, Telemetry, TickContext};
 use crate::control::schedule::Targets;
 use crate::estimate::crossing::Contact;
-use crate::estimate::{ContactStage, Findings, Shown};
+use crate::estimate::{ContactStage, Findings, PositionConfidence, Shown};
 use crate::fault::{Fault, Limit};
 use crate::model::planner::{KNOWN_SCALE, SHOWN_DEVIATION};
 use crate::model::{Learned, Review};
@@ -114,22 +114,22 @@ impl Controller {
     ) -> Telemetry {
         let crossing = matches!(state.mode, Mode::Run(_, Leg::Crossing | Leg::Approach));
         let plan = state.planning.plan.as_ref();
-        let learned = &state.planning.learned;
-        let friction = self.friction.min(learned.slips);
+        let friction = self.friction.min(state.planning.learned.slips);
         let planned = plan.map_or(friction, |plan| plan.slip_margin);
         let rolling = friction - part(self.load_of(state), tick.pressed());
-        let sensed = tick.sensed;
+        let is_sure = state.estimate.confidence() == PositionConfidence::Sure;
         Telemetry {
             at: tick.now,
             mode: state.mode,
             stage: state.stage,
             position: state.estimate.position,
-            speed: sensed.speed.value,
+            position_sigma: if is_sure { self.estimator.sigma(&state.estimate) } else { Q16::MAX },
+            speed: tick.sensed.speed.value,
             speed_ref: state.signed_speed(),
-            preload: sensed.preload.value,
+            preload: tick.sensed.preload.value,
             preload_ref: targets.preload,
-            compression: sensed.compression.value,
-            radius: sensed.radius.value,
+            compression: tick.sensed.compression.value,
+            radius: tick.sensed.radius.value,
             level: state.estimate.level,
             gap_predicted: plan.map_or(Q16::ZERO, |plan| plan.gap),
             slip_margin: if crossing { planned.min(rolling) } else { rolling },

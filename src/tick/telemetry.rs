@@ -15,6 +15,8 @@ macro_rules! quantities {
         $then! { $($given)*
             /// Estimated axial position of the wheel centre, mm.
             position: Millimetres, position_mm: f64, "odometry";
+            /// One sigma of it, mm; none, in the log 32767, while no landmark bears it out.
+            position_sigma: Millimetres, position_sigma_mm: Option<f64>, "odometry";
             /// Estimated speed of the wheel, mm/s.
             speed: MillimetresPerSecond, wheel_speed_mm_s: f64, "sensing", "speed" "estimated";
             /// Speed reference, asked for by the profile, mm/s.
@@ -31,8 +33,7 @@ macro_rules! quantities {
             gap_predicted: Millimetres, gap_predicted_mm: f64, "plan";
             /// Friction left unused, by the model for the present contact.
             slip_margin: Ratio, slip_margin: f64, "schedule", "slip margin" "planned";
-            /// Amplitude of the arm's mode: its largest since the approach to the latest step
-            /// began, mm.
+            /// Amplitude of the arm's mode, mm: its largest since the latest approach began.
             vibration: Millimetres, vibration_mm: f64, "vibration";
             /// Distance to the next face, mm; none, in the log 32767, when no face is left.
             distance: Millimetres, distance_mm: Option<f64>, "contact";

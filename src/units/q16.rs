@@ -1,7 +1,7 @@
 //! The number of the control path.
 
 use core::fmt;
-use core::ops::{Add, AddAssign, Mul, Neg, Sub, SubAssign};
+use core::ops::{Add, AddAssign, Mul, MulAssign, Neg, Sub, SubAssign};
 
 use fixed::traits::{FromFixed, ToFixed};
 use fixed::types::{I16F16, I32F32};
@@ -99,20 +99,32 @@ impl Q16 {
     }
 }
 
-impl Add for Q16 {
-    type Output = Self;
+/// Implements an operator, and the one that assigns its result.
+macro_rules! operators {
+    ($($on:ident $name:ident $assigns:ident $assign:ident($a:ident, $b:ident) $of:expr;)*) => {$(
+        impl $on for Q16 {
+            type Output = Self;
 
-    fn add(self, other: Self) -> Self {
-        Self(self.0.saturating_add(other.0))
-    }
+            fn $name(self, $b: Self) -> Self {
+                let $a = self;
+                $of
+            }
+        }
+
+        impl $assigns for Q16 {
+            fn $assign(&mut self, $b: Self) {
+                *self = (*self).$name($b);
+            }
+        }
+    )*};
 }
 
-impl Sub for Q16 {
-    type Output = Self;
-
-    fn sub(self, other: Self) -> Self {
-        Self(self.0.saturating_sub(other.0))
-    }
+operators! {
+    Add add AddAssign add_assign(a, b) Self(a.0.saturating_add(b.0));
+    Sub sub SubAssign sub_assign(a, b) Self(a.0.saturating_sub(b.0));
+    Mul mul MulAssign mul_assign(a, b) {
+        Self::saturating_from_bits((i64::from(a.0) * i64::from(b.0)) >> 16)
+    };
 }
 
 impl Neg for Q16 {
@@ -120,26 +132,6 @@ impl Neg for Q16 {
 
     fn neg(self) -> Self {
         Self(self.0.saturating_neg())
-    }
-}
-
-impl Mul for Q16 {
-    type Output = Self;
-
-    fn mul(self, other: Self) -> Self {
-        Self::saturating_from_bits((i64::from(self.0) * i64::from(other.0)) >> 16)
-    }
-}
-
-impl AddAssign for Q16 {
-    fn add_assign(&mut self, other: Self) {
-        *self = *self + other;
-    }
-}
-
-impl SubAssign for Q16 {
-    fn sub_assign(&mut self, other: Self) {
-        *self = *self - other;
     }
 }
 

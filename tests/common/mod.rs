@@ -15,7 +15,8 @@ use embassy_time::{Duration, Instant, MockDriver, Timer};
 use interstage::hal::{
     AnalogInput, AngleBus, CommandSource, Indicator, Journal, Light, Motors, Watchdog, WheelEncoder,
 };
-use interstage::params::slots::{FlashFault, SLOT_BYTES, SetMemory, Slot};
+use interstage::params::Refusal;
+use interstage::params::slots::{SLOT_BYTES, SetMemory, Slot};
 use interstage::restart::DriveSnapshot;
 use interstage::rig::Rig;
 use interstage::sense::raw::{
@@ -358,12 +359,12 @@ impl SetMemory for FixedFlash {
         &self.0[slot as usize]
     }
 
-    async fn erase(&mut self, _: Slot, _: usize) -> Result<(), FlashFault> {
-        Err(FlashFault)
+    async fn erase(&mut self, _: Slot, _: usize) -> Result<(), Refusal> {
+        Err(Refusal::Flash)
     }
 
-    async fn program(&mut self, _: Slot, _: usize, _: [u8; 8]) -> Result<(), FlashFault> {
-        Err(FlashFault)
+    async fn program(&mut self, _: Slot, _: usize, _: [u8; 8]) -> Result<(), Refusal> {
+        Err(Refusal::Flash)
     }
 }
 

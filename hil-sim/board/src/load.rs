@@ -14,9 +14,9 @@ use hil_sim::firmware::Footprint;
 const PERIOD: u64 = HZ / 1000;
 /// Name of the task that runs the control tick.
 const TICK: &str = "motors";
-/// Largest mean load: what the flash's waits may at worst make five times of it (four wait states
-/// at every cycle) leaves more than two fifths of the core.
-const LOAD: f64 = 0.25;
+/// Largest mean load: the flash's waits make 1.3 times of it where they are counted, less than half
+/// of the core, so that a plan takes at most twice as long as its own cycles.
+const LOAD: f64 = 0.33;
 /// Largest control tick, with waits where they are counted, as a part of its period. The tick
 /// begins with its millisecond; another one as long, of lower priority or of the sensors, still
 /// ends before the host and the model have their turn in its middle.

@@ -121,7 +121,8 @@ fn a_scenario_s_faults_come_on_the_board_too() {
     scenario.run.faults = vec![Injection { at_s: None, at_mm: Some(10.0), ..off }];
     let summary = ran(&scenario, false).recording.summary;
     assert_eq!(summary.faults.iter().map(|fault| fault.code).collect::<Vec<_>>(), [123]);
-    assert!(!summary.completed && (10.0..14.0).contains(&summary.travel_mm), "{summary:?}");
+    // Without its drive the axle sinks back on its tread.
+    assert!(!summary.completed && (9.5..14.0).contains(&summary.travel_mm), "{summary:?}");
     assert_eq!(summary.injected, ["encoder-line-b off from 10 mm"]);
 }
 

@@ -61,6 +61,7 @@ impl Given {
             axial: if self.driven == 0 { Axial::Pushed } else { load },
             scale: Q16::ONE,
             level: true,
+            shear: None,
             from: Q16::from_bits(self.from),
             until: Q16::from_bits(self.until),
         };

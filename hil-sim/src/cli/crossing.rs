@@ -223,7 +223,7 @@ fn ring(
 ) -> Result<Figures, Failure> {
     let (rig, mismatch) = (&scenario.rig, &scenario.mismatch);
     let driven = case.load_n.is_some();
-    let coupled = mismatch.tread_thickness_mm > 0.0;
+    let coupled = mismatch.tread_thickness > 0.0;
     let (elements, stride_mm) = if coupled { FINENESS_COUPLED } else { FINENESS };
     let case = CrossingCase {
         ring: RingParameters::of(rig, elements).with_mismatch(mismatch),

@@ -81,7 +81,7 @@ pub(super) fn print(
 }
 
 /// Columns of the runs.
-const COLUMNS: [Column; 11] = [
+const COLUMNS: [Column; 12] = [
     column("seed", "seed", "", 0),
     column("completed", "completed", "", 0),
     column("duration_s", "from the command", "s", 3),
@@ -89,6 +89,7 @@ const COLUMNS: [Column; 11] = [
     column("max_gap_mm", "worst gap", "mm", 3),
     column("gap_over_ref", "gap over reference", "", 4),
     column("end_off_mm", "off the commanded end", "mm", 3),
+    column("end_off_sigmas", "in stated sigmas", "", 2),
     column("slip_events", "slip events", "", 0),
     column("least_lead_s", "lead", "s", 3),
     column("least_slip_margin", "slip margin", "", 3),
@@ -159,6 +160,7 @@ fn figures(outcome: &montecarlo::Outcome) -> Frame {
         ("lead time, s", least(outcome.lead_time_s)),
         ("slip margin", least(outcome.slip_margin)),
         ("off the commanded end, mm", json!(outcome.end_off_mm)),
+        ("  in stated sigmas", json!(outcome.end_off_sigmas)),
     ];
     let found = outcome.steps_found.iter();
     let found = found.map(|s| (format!("step {} found off by, mm", s.index), json!(s.off_mm)));

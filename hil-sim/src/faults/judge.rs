@@ -63,8 +63,8 @@ impl Bounds {
     ///   time and lag. The screw's stop, at 1.25 of the limit, is farther.
     /// - Motion: what the wheel may be off its reference before 123 is reported, and the distance
     ///   in which it coasts from the largest speed with the motor's time constant,
-    ///   `m v_0 / F_stall`. A wheel that slips may slide off the corner it is on, by its run over
-    ///   that, `sqrt(R^2 - (R - h)^2)`, which no bridge can hold it on.
+    ///   `m v_0 / F_stall`. A wheel that slips, or is torn where it carries, may slide off the corner
+    ///   it is on, by its run over that, `sqrt(R^2 - (R - h)^2)`, which no bridge can hold it on.
     /// - End: the room before the end stop, where a wheel ends whose encoder went wrong on the
     ///   last millimetres.
     fn of(rig: &Rig, slips: bool) -> Self {
@@ -81,6 +81,13 @@ impl Bounds {
             end_mm: STOP_ROOM_MM,
         }
     }
+}
+
+/// Axial speed, mm/s: an axle that sinks on the rubber of a wheel that stands is held, and so is one
+/// at a stop, behind which the rubber relaxes.
+fn moves_mm_s(truth: &Truth) -> f64 {
+    let (axle, rigid) = (truth.speed_mm_s, truth.rigid_mm_s);
+    if axle * rigid > 0.0 { axle.signum() * axle.abs().min(rigid.abs()) } else { 0.0 }
 }
 
 /// The record of a run under judgement.
@@ -117,7 +124,7 @@ impl Judge {
         let fault = scenario.run.faults.first();
         let target = fault.map(|fault| fault.target);
         let reset = fault.filter(|fault| fault.target == Target::Reset);
-        let slips = target == Some(Target::Wheel);
+        let slips = matches!(target, Some(Target::Wheel | Target::Tread));
         let commanded = target == Some(Target::Commands);
         let entry = fault.and_then(|fault| entry(fault.target, fault.kind));
         let anomaly = scenario.run.anomalies.first().map(StepAnomaly::codes);
@@ -136,7 +143,7 @@ impl Judge {
     /// Looks at a tick: the controller's output and the true state after it. `active`: the
     /// fault is active.
     pub fn look(&mut self, t_s: f64, output: &Output, truth: &Truth, active: bool) {
-        let moved_mm = truth.position_mm - self.position_mm;
+        let moves_mm_s = moves_mm_s(truth);
         self.position_mm = truth.position_mm;
         self.mode = output.telemetry.mode;
         // The wheel follows the reference with a lag: the recent maximum counts.
@@ -146,7 +153,7 @@ impl Judge {
             return;
         }
         self.peak_preload_n = self.peak_preload_n.max(truth.preload_n);
-        self.motion_mm += self.uncommanded(moved_mm);
+        self.motion_mm += self.uncommanded(moves_mm_s * TICK_S);
         if let Mode::Complete(direction) = self.mode {
             let (stow_mm, end_mm) = self.ends_mm;
             let end_mm = if direction == Direction::Deploy { end_mm } else { stow_mm };
@@ -162,7 +169,7 @@ impl Judge {
             }
         }
         let off = !output.drive.enable && !output.preload.enable;
-        let still = truth.speed_mm_s.abs() < REST_MM_S && truth.tread_mm_s.abs() < REST_MM_S;
+        let still = moves_mm_s.abs() < REST_MM_S && truth.tread_mm_s.abs() < REST_MM_S;
         self.rest_s = (off && still).then(|| self.rest_s.unwrap_or(t_s));
     }
 
@@ -284,7 +291,8 @@ mod tests {
     /// A judge that has seen `ticks` of this mode at this reference and true speed, mm/s,
     /// under this preload, N.
     fn judged(mode: Mode, asked: f64, speed: f64, preload_n: f64, ticks: u32) -> Judge {
-        let mut truth = Truth { preload_n, speed_mm_s: speed, ..Truth::default() };
+        let mut truth =
+            Truth { preload_n, speed_mm_s: speed, rigid_mm_s: speed, ..Truth::default() };
         let mut judge = Judge::new(&Scenario::default(), &truth);
         let mut output = Output::default();
         output.telemetry.mode = mode;

@@ -10,9 +10,9 @@ use std::ops::Range;
 use nalgebra::DMatrix;
 
 use super::IdentifyError;
-use super::coordinates::{CREEP, Coordinates, FRICTION};
+use super::coordinates::{Coordinates, FRICTION, OFF};
 use super::forward::{Channels, Run, Trajectory, derivatives, quotient, simulate};
-use super::least_squares::{Model, Noise, consider, minimise, robust};
+use super::least_squares::{Model, Noise, minimise, robust};
 
 /// Deviations that the first fit assumes: compression, mm, angle, mrad, effort, N; ten
 /// times those of the sensors, as the start may be far off.
@@ -29,8 +29,6 @@ const BLOCKS: [usize; 3] = [16, 16, 4];
 const WIDENED: f64 = 1.18 * 1.9;
 /// Deviation of friction while nothing determines it, logarithm.
 const HELD_LN: f64 = 0.02;
-/// Deviation of the held creep law, logarithm.
-const HELD_CREEP_LN: f64 = 1e-5;
 
 /// The result.
 #[derive(Clone, Debug)]
@@ -126,13 +124,10 @@ pub fn fit(
     offsets_ln: &[f64],
 ) -> Result<Contact, IdentifyError> {
     let start: Vec<f64> = coordinates.priors().iter().map(|prior| prior.mean).collect();
-    // The creep law is held: fitted, it would absorb the model's errors at every climb.
-    let creep = coordinates.priors()[CREEP];
-    let law = coordinates.known(CREEP, creep.mean, HELD_CREEP_LN);
     // Friction shows in the creep, and only once the rest is in place.
-    let held = law.known(FRICTION, start[FRICTION], HELD_LN);
+    let held = coordinates.known(FRICTION, start[FRICTION], HELD_LN);
     let first = minimise(&Weighted::new(runs, &held), &start)?;
-    let mut model = Weighted::new(runs, &law);
+    let mut model = Weighted::new(runs, coordinates);
     model.reweigh(&first.x, &first.at);
     let second = minimise(&model, &first.x)?;
     model.reweigh(&second.x, &second.at);
@@ -144,9 +139,12 @@ pub fn fit(
         fitted = other.filter(|other| other.residuals.norm() < left).unwrap_or(fitted);
     }
     let blocks = model.blocks();
-    let data = blocks.last().map_or(0, |block| block.end);
     let mut covariance = robust(&fitted.jacobian, &fitted.residuals, &blocks, WIDENED)?;
-    consider(&mut covariance, &fitted.jacobian, data, CREEP, creep.deviation)?;
+    // What the model is off by moves what the logs weigh against it along.
+    for (index, off) in OFF {
+        let along = covariance.column(index) / covariance[(index, index)];
+        covariance += off * off * &along * along.transpose();
+    }
     let residuals = model.remaining(&fitted.x, &fitted.at);
     Ok(Contact { covariance, trajectories: fitted.at, x: fitted.x, residuals })
 }

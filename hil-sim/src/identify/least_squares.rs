@@ -135,26 +135,6 @@ pub(crate) fn robust(
     Ok(DMatrix::from_fn(n, n, |i, j| grown(i) * grown(j) * plain[(i, j)]))
 }
 
-/// Adds to a covariance what the coordinate `index` brings that is held in the fit but
-/// known only to `deviation`: `(dx/dc)(dx/dc)' s^2` with `dx/dc = -H^-1 J' j_c` over the
-/// rows of the data (a consider parameter, Schmidt 1966).
-pub(crate) fn consider(
-    covariance: &mut DMatrix<f64>,
-    jacobian: &DMatrix<f64>,
-    data: usize,
-    index: usize,
-    deviation: f64,
-) -> Result<(), IdentifyError> {
-    let plain = self::covariance(jacobian)?;
-    let rows = jacobian.rows(0, data);
-    let mut follows = -(plain * rows.transpose() * rows.column(index));
-    follows[index] = 1.0;
-    covariance.row_mut(index).fill(0.0);
-    covariance.column_mut(index).fill(0.0);
-    *covariance += &follows * follows.transpose() * (deviation * deviation);
-    Ok(())
-}
-
 /// Standard deviation about zero of residuals, and how much their correlation adds to the
 /// variance of a mean.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -276,21 +256,6 @@ mod tests {
         let of = |residuals| robust(&jacobian, residuals, &blocks, 1.0).unwrap()[(0, 0)];
         assert!((of(&alike) - 0.25).abs() < 1e-12, "{}", of(&alike));
         assert!((of(&each) - 1.0 / 40.0).abs() < 1e-12);
-    }
-
-    #[test]
-    fn a_held_coordinate_adds_its_own_uncertainty() {
-        // Readings of a + c, 25 of deviation 1, c held by a last row.
-        let held = 1e6;
-        let jacobian = DMatrix::from_fn(26, 2, |row, column| match (row, column) {
-            (25, 0) => 0.0,
-            (25, _) => held,
-            _ => 1.0,
-        });
-        let mut both = covariance(&jacobian).unwrap();
-        consider(&mut both, &jacobian, 25, 1, 0.3).unwrap();
-        assert!((both[(0, 0)] - (0.04 + 0.09)).abs() < 1e-6, "{both}");
-        assert!((both[(1, 1)] - 0.09).abs() < 1e-9 && (both[(0, 1)] + 0.09).abs() < 1e-6);
     }
 
     #[test]

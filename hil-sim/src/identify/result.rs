@@ -307,7 +307,7 @@ impl Document<'_> {
         let most = trajectories.map(|t| t.most_utilisation).fold(0.0, f64::max);
         let mut notes = vec![format!(
             "friction: the climbs used {most:.2}, so that it is at least that; the rest is what \
-             their creep shows, given plant.elastic_creep"
+             their creep shows, beside the compliance along the wall"
         )];
         notes.extend(self.runs.iter().filter(|run| run.traces.slips).map(|run| {
             let name = &run.name;

@@ -100,6 +100,8 @@ pub struct Outcome {
     pub later_gap_over_ref: Option<Quantiles>,
     /// Distance from the commanded end of the runs that the controller calls complete, mm.
     pub end_off_mm: Option<Quantiles>,
+    /// The same over the one sigma that the controller states of its position there.
+    pub end_off_sigmas: Option<Quantiles>,
     /// Distances with which the steps were found.
     pub steps_found: Vec<StepFound>,
     /// Least time by which the preload was reached before a corner touched, s.
@@ -139,6 +141,7 @@ impl Outcome {
             first_gap_over_ref: quantiles(figure(&|line| line.first_gap_over_ref)),
             later_gap_over_ref: quantiles(figure(&|line| line.later_gap_over_ref)),
             end_off_mm: quantiles(figure(&|line| line.end_off_mm)),
+            end_off_sigmas: quantiles(figure(&|line| line.end_off_sigmas)),
             steps_found: steps_found(lines),
             lead_time_s: least(figure(&|line| line.least_lead_s)),
             slip_margin: least(figure(&|line| line.least_slip_margin)),

@@ -127,10 +127,9 @@ mod tests {
     use super::*;
     use crate::params::set_of;
     use crate::probe::{Mute, PortError};
+    use interstage::params::Refusal;
     use interstage::params::service::Service;
-    use interstage::params::slots::{
-        FlashFault, PAGE_BYTES, SLOT_BYTES, SetMemory, Slot, WORD_BYTES,
-    };
+    use interstage::params::slots::{PAGE_BYTES, SLOT_BYTES, SetMemory, Slot, WORD_BYTES};
     use interstage::rig::Rig;
 
     struct Flash([Vec<u8>; 2]);
@@ -140,7 +139,7 @@ mod tests {
             &self.0[slot as usize]
         }
 
-        async fn erase(&mut self, slot: Slot, page: usize) -> Result<(), FlashFault> {
+        async fn erase(&mut self, slot: Slot, page: usize) -> Result<(), Refusal> {
             self.0[slot as usize][page * PAGE_BYTES..][..PAGE_BYTES].fill(0xFF);
             Ok(())
         }
@@ -150,7 +149,7 @@ mod tests {
             slot: Slot,
             offset: usize,
             word: [u8; WORD_BYTES],
-        ) -> Result<(), FlashFault> {
+        ) -> Result<(), Refusal> {
             self.0[slot as usize][offset..][..WORD_BYTES].copy_from_slice(&word);
             Ok(())
         }

@@ -250,9 +250,9 @@ impl Balance {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::plant::grip::Gives;
     use crate::plant::ring::RingParameters;
     use crate::plant::wall::{Step, Wall};
+    use crate::plant::wind_up::{Shear, WindUp};
     use interstage::rig::Rig;
 
     /// A ring on both floor and corner, and a motion that leaves it there.
@@ -269,9 +269,10 @@ mod tests {
 
     /// A wheel that has just met a corner and loses speed against it.
     fn carried(load_n: f64) -> Grip {
+        let shear = Shear::of(&RingParameters::of(&Rig::fe(), 1440), 1.0);
         Grip {
             mu: 0.9,
-            gives: Gives::Creeps { creep: 0.01, rolling: 8.0 },
+            winding: WindUp::default().over(&shear, 8.0, 6.0, 1e-3),
             load_n,
             inertia: 1.0,
             speed: 8.0,

@@ -39,11 +39,8 @@ pub struct PlantParameters {
     pub mu: f64,
     /// Amplitude of its waves along the wall over its mean, and their length, mm.
     pub friction_waves: (f64, f64),
-    /// Creepage at 63 % of friction.
-    pub elastic_creep: f64,
-    /// Compliance along the wall over that of the tread's layer: the part that is taken into
-    /// account, 0 for a tread that is rigid there, and its factor.
-    pub wind_up: (f64, f64),
+    /// Factor of the tread's compliance along the wall.
+    pub wind_up: f64,
     /// Part of the compression by which the rolling radius is less than the undeformed one.
     pub rolling_compression: f64,
     /// Axial load on this wheel, N.
@@ -113,7 +110,7 @@ impl PlantParameters {
 
     /// The tread displaced along the wall.
     pub fn shear(&self) -> Shear {
-        Shear::of(&self.ring, self.wind_up.0 * self.wind_up.1)
+        Shear::of(&self.ring, self.wind_up)
     }
 
     /// The pre-tightener with this dead time, s.
@@ -188,8 +185,7 @@ impl PlantParameters {
             stops_mm: (-STOP_ROOM_MM, rig.rig.travel_mm + STOP_ROOM_MM),
             mu,
             friction_waves: (0.0, 22.0),
-            elastic_creep: rig.plant.elastic_creep,
-            wind_up: (0.0, 1.0),
+            wind_up: 1.0,
             rolling_compression: 1.0 / 3.0,
             load_n: load,
             mass_kg: rig.plant.moved_mass_kg,

@@ -8,41 +8,23 @@
 
 use super::wind_up::Winding;
 
-/// Logarithm of the part of friction left over, from which on a wheel counts as sliding:
-/// 99.9 % of it used.
-pub(super) const SLIDES_FROM: f64 = 6.907_755_278_982_137;
-
 /// Slip that is rounding, mm/s.
 const STANDS_BELOW: f64 = 1e-9;
-
-/// How the tread gives way to traction.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Gives {
-    /// It creeps by `rolling creep q` with q = -ln(1 - p): at first in proportion to the part p of
-    /// friction that is used, without bound as p comes to 1.
-    Creeps {
-        /// Creepage at 63 % of friction.
-        creep: f64,
-        /// Speed of the tread that it creeps in proportion to, mm/s, not negative.
-        rolling: f64,
-    },
-    /// It winds up, and creeps: at first in proportion to traction, by Carter (1926)
-    /// `2 (1 - sqrt(1 - p)) / p` times as much, twice at the limit of friction, where it slides.
-    WindsUp(Winding),
-}
 
 /// A driven wheel on a step of time from known speeds.
 ///
 /// With p the part of friction used, c and s the cosine and sine sums of the contact and m/dt the
 /// carriage's inertia, the carriage ends the step at `v1 = v0 + (mu p c - s - load) dt/m`.
 /// Friction is that for which this is the speed of a gripping wheel, `advance u1` with the
-/// tread's speed u1, less what the tread [gives](Gives) way by.
+/// tread's speed u1, less what the tread winds up and creeps by: at first in proportion to
+/// traction, by Carter (1926) `2 (1 - sqrt(1 - p)) / p` times as much, twice at the limit of
+/// friction, where it slides.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Grip {
     /// Friction of tread on wall.
     pub mu: f64,
-    /// How the tread gives way.
-    pub gives: Gives,
+    /// How the tread winds up.
+    pub winding: Winding,
     /// Axial load on the carriage, N.
     pub load_n: f64,
     /// Carriage's inertia over the step, N per mm/s.
@@ -83,18 +65,11 @@ impl Grip {
         let most = self.mu * cosine;
         let slows = self.inertia * self.advance;
         // All of friction takes this off the carriage's momentum by winding up and by creep.
-        let (winds, lag, wound) = match self.gives {
-            Gives::Creeps { creep, rolling } => (0.0, self.inertia * rolling * creep, 0.0),
-            Gives::WindsUp(Winding { n_per_mm, free_n, from_mm, dt_s, creeps, .. }) => {
-                let per_mm_s = slows * most * self.normal;
-                let wound = slows * (free_n / n_per_mm + from_mm) / dt_s;
-                (per_mm_s / (n_per_mm * dt_s), 2.0 * per_mm_s * creeps, wound)
-            }
-        };
-        let solve = |asked: f64, whole: f64| match self.gives {
-            Gives::Creeps { .. } => Used::of(asked.abs(), whole, lag),
-            Gives::WindsUp(_) => Used::by_carter(asked.abs(), whole, lag),
-        };
+        let Winding { n_per_mm, free_n, from_mm, dt_s, creeps, .. } = self.winding;
+        let per_mm_s = slows * most * self.normal;
+        let wound = slows * (free_n / n_per_mm + from_mm) / dt_s;
+        let (winds, lag) = (per_mm_s / (n_per_mm * dt_s), 2.0 * per_mm_s * creeps);
+        let solve = |asked: f64, whole: f64| Used::by_carter(asked.abs(), whole, lag);
         let mut asked = self.asked(self.tread, sine) + wound;
         let per_part = self.yields * self.normal * most;
         let sense = if asked * self.tread < 0.0 { -1.0 } else { 1.0 };
@@ -116,10 +91,7 @@ impl Grip {
         let utilisation = (self.mu * used.part).copysign(asked);
         let per = used.left / (whole * used.left + lag).max(f64::MIN_POSITIVE);
         // What grows with the cosine sum at the same part of friction.
-        let grows = match self.gives {
-            Gives::Creeps { .. } => utilisation * per * whole,
-            Gives::WindsUp(_) => asked * self.mu * per,
-        };
+        let grows = asked * self.mu * per;
         (utilisation, (-grows / cosine, self.mu * per))
     }
 
@@ -151,26 +123,18 @@ impl Grip {
     /// Speed of the tread over the wall without what winds it up, mm/s, at this tread's and
     /// carriage's speed and this traction.
     pub fn creeps(&self, tread: f64, speed: f64, traction_n: f64) -> f64 {
-        match self.gives {
-            Gives::Creeps { .. } => self.advance * tread - speed,
-            Gives::WindsUp(winding) => {
-                let winds = (winding.end(traction_n).mm - winding.from_mm) / winding.dt_s;
-                tread - speed / self.advance - winds
-            }
-        }
+        let winding = &self.winding;
+        let winds = (winding.end(traction_n).mm - winding.from_mm) / winding.dt_s;
+        tread - speed / self.advance - winds
     }
 
     /// The part of it that is beyond elastic creep, mm/s.
     pub fn slides(&self, ended: &Ended, utilisation: f64, cosine: f64) -> f64 {
         let slip =
             self.creeps(ended.tread, ended.speed, self.traction_n(utilisation, cosine)).abs();
-        let (elastic, slides) = match self.gives {
-            Gives::Creeps { creep, rolling } => (SLIDES_FROM * creep * rolling, true),
-            // Where all friction is used.
-            Gives::WindsUp(Winding { creeps, .. }) => {
-                (2.0 * self.traction_n(self.mu, cosine) * creeps, utilisation.abs() >= self.mu)
-            }
-        };
+        // Where all friction is used.
+        let elastic = 2.0 * self.traction_n(self.mu, cosine) * self.winding.creeps;
+        let slides = utilisation.abs() >= self.mu;
         let beyond = slip - elastic;
         if slides && beyond > STANDS_BELOW { beyond } else { 0.0 }
     }
@@ -208,59 +172,6 @@ impl Used {
         let root = root.min(1.0);
         Self { part: 1.0 - root * root, left: 2.0 * root }
     }
-
-    /// Solves `whole p - lag ln(1 - p) = asked`, none of them negative, to a part of 1e-10.
-    fn of(asked: f64, whole: f64, lag: f64) -> Self {
-        if lag <= 0.0 {
-            let part = if asked < whole { asked / whole } else { 1.0 };
-            return Self { part, left: 1.0 - part };
-        }
-        let enough = 1e-10 * asked;
-        // By the first two terms of the logarithm, and once by Newton's method.
-        let first = asked / (whole + lag);
-        let mut part = first - 0.5 * lag * first * first / (whole + lag);
-        if first < 0.9 {
-            for _ in 0..3 {
-                let left = 1.0 - part;
-                let over = whole * part - lag * left.ln() - asked;
-                let change = over * left / (whole * left + lag);
-                part -= change;
-                // What Newton's method leaves, by the second derivative.
-                let rest = 0.5 * lag * (change / left).powi(2);
-                if rest <= enough && (0.0..1.0).contains(&part) {
-                    return Self { part, left: 1.0 - part };
-                }
-            }
-        }
-        Self::slowly(asked, whole, lag, enough)
-    }
-
-    /// The same wherever that fails, from the side from which Newton's method cannot overstep.
-    fn slowly(asked: f64, whole: f64, lag: f64, enough: f64) -> Self {
-        if asked < whole {
-            let mut part = (asked / whole).min(-(-asked / lag).exp_m1());
-            for _ in 0..60 {
-                let left = 1.0 - part;
-                let over = whole * part - lag * left.ln() - asked;
-                if over <= enough {
-                    break;
-                }
-                part -= over * left / (whole * left + lag);
-            }
-            return Self { part, left: 1.0 - part };
-        }
-        // In q, which goes on where p has come to 1.
-        let mut q = ((asked - whole) / lag).max(asked / (whole + lag));
-        for _ in 0..60 {
-            let left = (-q).exp();
-            let short = asked - whole * (1.0 - left) - lag * q;
-            if short <= enough {
-                break;
-            }
-            q += short / (whole * left + lag);
-        }
-        Self { part: -(-q).exp_m1(), left: (-q).exp() }
-    }
 }
 
 #[cfg(test)]
@@ -288,7 +199,7 @@ mod tests {
     fn grip() -> Grip {
         Grip {
             mu: 1.1,
-            gives: Gives::Creeps { creep: 0.01, rolling: 8.0 },
+            winding: WindUp::default().over(&shear(), 8.0, 6.0, 1e-3),
             load_n: 6.7,
             inertia: 1.0,
             speed: 7.9,
@@ -301,19 +212,6 @@ mod tests {
     }
 
     proptest! {
-        #[test]
-        fn friction_solves_its_equation(
-            asked in -9.0f64..6.0, whole in -6.0f64..6.0, lag in -12.0f64..6.0,
-        ) {
-            let [asked, whole, lag] = [asked, whole, lag].map(|exponent| 10f64.powf(exponent));
-            let used = Used::of(asked, whole, lag);
-            prop_assert!((0.0..=1.0).contains(&used.part) && used.left >= 0.0);
-            // Where p is known no better than to its last bit, so is its logarithm.
-            let error = whole * used.part - lag * used.left.ln() - asked;
-            let grain = lag * 2e-16 / used.left + 2e-16 * whole;
-            prop_assert!(error.abs() <= 1.1e-10 * asked + grain, "{used:?}: {error}");
-        }
-
         #[test]
         fn carter_solves_its_equation(
             asked in -9.0f64..6.0, whole in -6.0f64..6.0, lag in -12.0f64..6.0,
@@ -341,40 +239,17 @@ mod tests {
             let kinetic = |v: f64, u: f64| 0.5e-3 * (mass * v * v + 2.0 * u * u);
             let before = kinetic(speed, tread);
             let winding = WindUp::default().over(&shear(), rolling, 6.0, dt);
-            for gives in [Gives::Creeps { creep: 0.01, rolling }, Gives::WindsUp(winding)] {
-                let grip = Grip { gives, ..grip };
-                let (used, ended) = at(&grip, 30.0, 0.0);
-                let traction = grip.traction_n(used, 30.0);
-                let stored = match gives {
-                    Gives::Creeps { .. } => 0.0,
-                    Gives::WindsUp(winding) => winding.end(traction).stored_mj(&shear()),
-                };
-                let after = kinetic(ended.speed, ended.tread) + stored;
-                prop_assert!(after <= before * (1.0 + 1e-9) + 1e-9);
-                prop_assert!(used.abs() <= mu);
-                // Friction acts against the slip that is left.
-                let slip = grip.creeps(ended.tread, ended.speed, traction);
-                prop_assert!(slip * used >= -1e-6 * before);
-            }
+            let grip = Grip { winding, ..grip };
+            let (used, ended) = at(&grip, 30.0, 0.0);
+            let traction = grip.traction_n(used, 30.0);
+            let stored = winding.end(traction).stored_mj(&shear());
+            let after = kinetic(ended.speed, ended.tread) + stored;
+            prop_assert!(after <= before * (1.0 + 1e-9) + 1e-9);
+            prop_assert!(used.abs() <= mu);
+            // Friction acts against the slip that is left.
+            let slip = grip.creeps(ended.tread, ended.speed, traction);
+            prop_assert!(slip * used >= -1e-6 * before);
         }
-    }
-
-    #[test]
-    fn steady_traction_carries_the_load_at_its_creep() {
-        let mut grip = grip();
-        let mut tread = 8.0;
-        for _ in 0..100 {
-            grip.gives = Gives::Creeps { creep: 0.01, rolling: tread };
-            grip.tread = tread + grip.yields * 6.7 * 1.0;
-            let (_, ended) = at(&grip, 33.3, 0.0);
-            (tread, grip.speed) = (ended.tread, ended.speed);
-        }
-        let (used, ended) = at(&grip, 33.3, 0.0);
-        let part = 6.7 / 33.3 / 1.1;
-        assert!((used - 1.1 * part).abs() < 1e-6, "{used}");
-        let creep = -0.01 * (1.0f64 - part).ln();
-        assert!((ended.speed / ended.tread - (1.0 - creep)).abs() < 1e-5, "{ended:?}");
-        assert_eq!(grip.slides(&ended, used, 33.3), 0.0);
     }
 
     #[test]
@@ -383,7 +258,7 @@ mod tests {
         let (mut tread, mut used, mut ended) = (8.0, 0.0, Ended::default());
         for _ in 0..5000 {
             let winding = wind_up.over(&shear, tread, 6.0, 1e-3);
-            grip.gives = Gives::WindsUp(winding);
+            grip.winding = winding;
             grip.tread = tread + grip.yields * 6.7;
             (used, ended) = at(&grip, 33.3, 0.0);
             wind_up = winding.end(grip.traction_n(used, 33.3));
@@ -408,8 +283,7 @@ mod tests {
             let mut farthest = 0.0f64;
             for tick in 0..12_000 {
                 let winding = wind_up.over(&shear(), 0.0, 6.0, 1e-3);
-                let gives = Gives::WindsUp(winding);
-                let grip = Grip { gives, tread: 0.0, speed, load_n, ..grip() };
+                let grip = Grip { winding, tread: 0.0, speed, load_n, ..grip() };
                 let (used, ended) = at(&grip, 33.3, 0.0);
                 wind_up = winding.end(grip.traction_n(used, 33.3));
                 (speed, position) = (ended.speed, position + 1e-3 * ended.speed);
@@ -426,18 +300,21 @@ mod tests {
 
     #[test]
     fn beyond_friction_it_slides() {
-        let grip = Grip { load_n: 60.0, ..grip() };
+        // Wound up as far as friction goes: it winds no further, and all is creep and slip.
+        let winding = WindUp::steady(&shear(), 1.1 * 33.3, 8.0, 6.0).over(&shear(), 8.0, 6.0, 1e-3);
+        let grip = Grip { load_n: 60.0, winding, ..grip() };
         let (used, ended) = at(&grip, 33.3, 0.0);
         assert!((used - 1.1).abs() < 1e-12);
         assert!((ended.speed - (7.9 + 1.1 * 33.3 - 60.0)).abs() < 1e-9);
-        assert!(grip.slides(&ended, used, 33.3) > 20.0);
+        let slides = ended.tread - ended.speed - 2.0 * 1.1 * 33.3 * winding.creeps;
+        assert!((grip.slides(&ended, used, 33.3) - slides).abs() < 1e-6);
     }
 
     #[test]
     fn what_winds_the_tread_up_to_the_limit_of_friction_is_no_slip() {
         let before = WindUp::steady(&shear(), 36.0, 8.0, 6.0);
         let winding = before.over(&shear(), 8.0, 6.0, 1e-3);
-        let grip = Grip { load_n: 60.0, gives: Gives::WindsUp(winding), ..grip() };
+        let grip = Grip { load_n: 60.0, winding, ..grip() };
         let (used, ended) = at(&grip, 33.3, 0.0);
         assert!((used - 1.1).abs() < 1e-12);
         let wound = winding.end(grip.traction_n(used, 33.3));
@@ -457,14 +334,13 @@ mod tests {
         ] {
             let rigid = Grip { load_n, tread, offset_n, ..grip() };
             let winding = WindUp::steady(&shear(), 5.0, 8.0, 6.0).over(&shear(), 8.0, 6.0, 1e-3);
-            for grip in [rigid, Grip { gives: Gives::WindsUp(winding), ..rigid }] {
-                let (c, s, h) = (33.3, 4.0, 1e-5);
-                let used = |c, s| grip.utilisation(c, s).0;
-                let by_cosine = (used(c + h, s) - used(c - h, s)) / (2.0 * h);
-                let by_sine = (used(c, s + h) - used(c, s - h)) / (2.0 * h);
-                let slope = grip.utilisation(c, s).1;
-                assert!((slope.0 - by_cosine).abs() < 1e-6 && (slope.1 - by_sine).abs() < 1e-6);
-            }
+            let grip = Grip { winding, ..rigid };
+            let (c, s, h) = (33.3, 4.0, 1e-5);
+            let used = |c, s| grip.utilisation(c, s).0;
+            let by_cosine = (used(c + h, s) - used(c - h, s)) / (2.0 * h);
+            let by_sine = (used(c, s + h) - used(c, s - h)) / (2.0 * h);
+            let slope = grip.utilisation(c, s).1;
+            assert!((slope.0 - by_cosine).abs() < 1e-6 && (slope.1 - by_sine).abs() < 1e-6);
         }
     }
 
@@ -477,14 +353,11 @@ mod tests {
 
     #[test]
     fn a_weak_motor_is_brought_to_rest_and_not_through_it() {
-        let creeps = Gives::Creeps { creep: 0.01, rolling: 0.1 };
         let winding = WindUp::steady(&shear(), 30.0, 0.0, 6.0).over(&shear(), 0.0, 6.0, 1e-3);
-        for gives in [creeps, Gives::WindsUp(winding)] {
-            let grip = Grip { load_n: 30.0, tread: 0.1, speed: 0.0, gives, ..grip() };
-            let (_, ended) = at(&grip, 33.3, 0.0);
-            assert_eq!(ended.tread, 0.0);
-            assert!(ended.speed <= 0.0 && ended.speed > -1.0, "{ended:?}");
-            assert!(ended.tread_load_n > 29.0);
-        }
+        let grip = Grip { load_n: 30.0, tread: 0.1, speed: 0.0, winding, ..grip() };
+        let (_, ended) = at(&grip, 33.3, 0.0);
+        assert_eq!(ended.tread, 0.0);
+        assert!(ended.speed <= 0.0 && ended.speed > -1.0, "{ended:?}");
+        assert!(ended.tread_load_n > 29.0);
     }
 }

@@ -68,7 +68,7 @@ impl PlantParameters {
                 CRUSHES,
                 format!(
                     "{pressed}, presses a corner {depth_mm:.1} mm deep into \
-                     mismatch.tread_thickness_mm = {thickness_mm:.1}: at most {most_mm:.1} mm"
+                     mismatch.tread_thickness, {thickness_mm:.1} mm: at most {most_mm:.1} mm"
                 ),
             );
         }
@@ -166,7 +166,7 @@ mod tests {
         thin.ring.tread_thickness_mm = 5.0;
         assert_eq!(thin.check(150.0), Ok(()));
         let refusal = thin.check(190.0).unwrap_err();
-        assert!(refusal.to_string().contains("mismatch.tread_thickness_mm = 5.0"), "{refusal}");
+        assert!(refusal.to_string().contains("mismatch.tread_thickness, 5.0 mm"), "{refusal}");
         // The load presses too, through a trailing arm.
         let mut heavy = nominal();
         heavy.ring.k_inf = 0.02;

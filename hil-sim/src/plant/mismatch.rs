@@ -58,8 +58,9 @@ section! {
         /// Part of the force at the tread that drives a mode: its shape there, 1, chosen.
         mode_shape: 1.0, (0.0, 2.0), (0.5, 1.0);
         /// Thickness of the tread as a layer of incompressible rubber, whose elements push each
-        /// other; 0: independent elements, as the controller's model has them.
-        tread_thickness_mm: 0.0, (0.0, 16.0), (4.0, 12.0);
+        /// other, over `tread.thickness_mm`; 0: independent elements, as the controller's model has
+        /// them.
+        tread_thickness: 0.0, (0.0, 2.0), (0.9, 1.1);
         /// Spread s of two relaxations of equal share in place of the one at tau: at tau/s and
         /// tau s.
         second_relaxation: 1.0, (1.0, 10.0), (1.0, 4.0);
@@ -73,10 +74,7 @@ section! {
         friction_waviness: 0.0, (0.0, 0.5), (0.0, 0.1);
         /// Length of the waves of the friction: of the order of the distance of two steps.
         friction_wave_mm: 22.0, (2.0, 200.0), (11.0, 44.0);
-        /// Part of the tread's compliance along the wall that the plant has: 0 none, as the controller
-        /// believes, 1 that of a layer of rubber. Not drawn.
-        wind_up: 0.0, (0.0, 1.0);
-        /// Factor of that compliance: compound, and form of the hub.
+        /// Factor of the tread's compliance along the wall: compound, and form of the hub.
         wind_up_compliance: 1.0, (0.1, 3.0), (0.7, 1.4);
     }
 }
@@ -123,7 +121,7 @@ impl RingParameters {
             self.k_0 = self.k_inf * stiffening;
         }
         self.tau_s *= tread_tau;
-        self.tread_thickness_mm = mismatch.tread_thickness_mm;
+        self.tread_thickness_mm = mismatch.tread_thickness * self.layer_mm;
         self.second_relaxation = mismatch.second_relaxation;
         self
     }
@@ -143,7 +141,7 @@ impl PlantParameters {
         });
         (self.screw_droop, self.screw_friction) = (mismatch.screw_droop, mismatch.screw_friction);
         self.friction_waves = (mismatch.friction_waviness, mismatch.friction_wave_mm);
-        self.wind_up = (mismatch.wind_up, mismatch.wind_up_compliance);
+        self.wind_up = mismatch.wind_up_compliance;
         self.run_out_mm = mismatch.run_out_mm;
         self.backlash_mm = mismatch.backlash_mm;
         self.pivot_friction_n = mismatch.pivot_friction_n;
@@ -209,7 +207,6 @@ mod tests {
             let values = draws.iter().map(|draw| draw.values().nth(index).unwrap().1);
             let stays = match field.name {
                 "backlash_mm" => Some(0.4),
-                "wind_up" => Some(0.0),
                 _ => None,
             };
             if let Some(stays) = stays {

@@ -14,6 +14,9 @@ pub struct Truth {
     pub speed_mm_s: f64,
     /// Tread speed by the wheel's spin, mm/s.
     pub tread_mm_s: f64,
+    /// Axial speed without what the tread winds up by, mm/s: that of a rigid tread's contact. A
+    /// wheel that stands sinks with its axle, until the rubber has relaxed, and not with this.
+    pub rigid_mm_s: f64,
     /// Angle turned, rad.
     pub rotation_rad: f64,
     /// Radial preload of the pre-tightener, N.

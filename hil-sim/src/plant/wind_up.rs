@@ -5,22 +5,14 @@
 //! the contact: the displacement is lost over the relaxation length, the memory over half the
 //! length of the contact, the mean age of the rubber in it.
 
-use std::f64::consts::{PI, TAU};
+use interstage::rig::shear;
 
 use super::ring::RingParameters;
-
-/// Thickness for a tread of independent elements, mm: its layer has the gaps nearest to theirs.
-/// Chosen, as the thickness is not published.
-pub const NOMINAL_THICKNESS_MM: f64 = 8.0;
-
-/// Length of the contact that the stiffness is taken at, mm: the corner's at 33 to 50 N, where
-/// traction is largest. The wall's is twice as long and 1.2 times as stiff.
-const REFERENCE_MM: f64 = 2.5;
 
 /// Rubber between rim and hub, displaced along the wall.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shear {
-    /// Stiffness of the relaxed tread along the wall, N/mm; infinite where it is rigid.
+    /// Stiffness of the relaxed tread along the wall, N/mm.
     pub n_per_mm: f64,
     /// Relaxation length over the length of the contact.
     pub relaxation_lengths: f64,
@@ -53,29 +45,16 @@ pub struct Winding {
 }
 
 impl Shear {
-    /// The layer of this wheel, `compliance` times as compliant; 0: rigid.
-    ///
-    /// Incompressible rubber of thickness t and width L, bonded to the hub, on a contact of length
-    /// a under elliptic pressure and traction in proportion to it, G its relaxed shear modulus:
-    /// `G L / k = ln(1 + 9.9 t/a) / 2 pi + ((1 - t/R)^-2 - 1) / 4 pi + 0.22 t/R`, the compliance of
-    /// a flat layer, the rim's rotation on the hub, and the curvature. Within 2 % of the sum over
-    /// the waves of the layer (`ring::layer`), at 2.5 mm and from 3 to 16 mm thick. Steady creep
-    /// is that of a half-space, `F / (pi G L a)` (Johnson, Contact Mechanics, 8.3).
+    /// The layer of this wheel, `compliance` times as compliant.
     pub fn of(ring: &RingParameters, compliance: f64) -> Self {
         let thickness = ring.thickness_mm();
-        let per_modulus = ring.width_mm / compliance_of(ring.radius_mm, thickness, REFERENCE_MM);
-        let n_per_mm = modulus(ring, thickness) * per_modulus / compliance;
+        let layer = shear::Shear::of_layer(ring.radius_mm, ring.width_mm, thickness, ring.k_inf);
         Self {
-            n_per_mm,
-            relaxation_lengths: PI * ring.width_mm / per_modulus,
+            n_per_mm: layer.n_per_mm / compliance,
+            relaxation_lengths: layer.relaxation_lengths,
             stiffening: ring.k_0 / ring.k_inf,
             relaxations_s: ring.relaxations_s(),
         }
-    }
-
-    /// Whether it gives way at all.
-    pub fn gives_way(&self) -> bool {
-        self.n_per_mm.is_finite()
     }
 
     /// Stiffness in steady rolling that renews the tread in contact at this rate, 1/s, N/mm.
@@ -89,23 +68,8 @@ impl Shear {
 impl RingParameters {
     /// Thickness of the tread as a layer, mm.
     fn thickness_mm(&self) -> f64 {
-        if self.is_coupled() { self.tread_thickness_mm } else { NOMINAL_THICKNESS_MM }
+        if self.is_coupled() { self.tread_thickness_mm } else { self.layer_mm }
     }
-}
-
-/// Relaxed shear modulus, N/mm^2, that gives the ring's gap at 100 N: within 2 % of
-/// `ring::layer::modulus_mm` from 3 to 16 mm thick.
-fn modulus(ring: &RingParameters, thickness_mm: f64) -> f64 {
-    let thin = 1.0 + (2.27 / thickness_mm).powi(3);
-    ring.k_inf * 0.1096 * thickness_mm / (thin * (1.0 + 0.0052 * thickness_mm))
-}
-
-/// Displacement of the rim in the contact per traction, times `G L`.
-fn compliance_of(radius_mm: f64, thickness_mm: f64, contact_mm: f64) -> f64 {
-    let part = thickness_mm / radius_mm;
-    let layer = (9.9 * thickness_mm / contact_mm).ln_1p() / TAU;
-    let rotation = ((1.0 - part).powi(-2) - 1.0) / (2.0 * TAU);
-    layer + rotation + 0.22 * part
 }
 
 impl WindUp {
@@ -140,9 +104,6 @@ impl WindUp {
 
     /// Stored energy, mJ.
     pub fn stored_mj(&self, shear: &Shear) -> f64 {
-        if !shear.gives_way() {
-            return 0.0;
-        }
         let more = 0.5 * (shear.stiffening - 1.0);
         let branches: f64 = self.memory_mm.iter().map(|q| more * (self.mm - q).powi(2)).sum();
         0.5 * shear.n_per_mm * (self.mm * self.mm + branches)
@@ -162,6 +123,10 @@ mod tests {
     use super::*;
     use crate::plant::ring::layer::{modulus_mm, shear_compliance};
     use interstage::rig::Rig;
+    use interstage::rig::shear::{compliance_of, modulus};
+    use std::f64::consts::{PI, TAU};
+
+    const REFERENCE_MM: f64 = 2.5;
 
     fn ring(thickness_mm: f64) -> RingParameters {
         RingParameters {
@@ -206,7 +171,7 @@ mod tests {
             let off = compliance_of(25.0, thickness, REFERENCE_MM) / exact - 1.0;
             assert!(off.abs() < 0.02, "{thickness}: {off}");
             let rubber = ring(thickness);
-            let off = modulus(&rubber, thickness) / (rubber.k_inf * modulus_mm(&rubber)) - 1.0;
+            let off = modulus(thickness, rubber.k_inf) / (rubber.k_inf * modulus_mm(&rubber)) - 1.0;
             assert!(off.abs() < 0.02, "{thickness}: {off}");
         }
     }
@@ -224,7 +189,6 @@ mod tests {
         }
         let wall = compliance_of(25.0, 8.0, 2.5) / compliance_of(25.0, 8.0, 6.0);
         assert!((1.2..1.25).contains(&wall), "{wall}");
-        assert!(!Shear::of(&ring(0.0), 0.0).gives_way());
     }
 
     /// Whatever the course of the traction, no more comes back than was put in.

@@ -210,7 +210,7 @@ impl Decoder {
     }
 
     fn frame(&mut self, frame: &Frame<'_>, length: u64, take: &mut impl FnMut(Item)) {
-        let Ok(body) = frame.body() else {
+        let Some(body) = frame.body() else {
             // The checksum matches by chance.
             return self.mark_garbage(length, take);
         };
@@ -224,8 +224,8 @@ impl Decoder {
             Body::Ticks(ticks) => {
                 for record in ticks {
                     match record {
-                        Ok(record) => self.tick(&record, take),
-                        Err(_) => self.mark_garbage(length, take),
+                        Some(record) => self.tick(&record, take),
+                        None => self.mark_garbage(length, take),
                     }
                 }
             }
@@ -257,7 +257,7 @@ impl Decoder {
     fn clock_went_back(&self, body: &Body<'_>) -> bool {
         let Some((last, _)) = self.last else { return false };
         let Body::Ticks(ticks) = body else { return false };
-        let first = ticks.clone().find_map(Result::ok);
+        let first = ticks.clone().flatten().next();
         first.is_some_and(|first| (first.at().wrapping_sub(last) as i32) <= 0)
     }
 

@@ -72,6 +72,8 @@ impl RunRecorder {
     ) {
         let t_s = self.time_s();
         digest(&mut self.digest, telemetry);
+        let sigma = telemetry.position_sigma;
+        self.summary.position_sigma_mm = (sigma < Q16::MAX).then(|| sigma.to_num());
         for Entry { event, .. } in events {
             self.log.push(LogLine { t_s, text: text(event) });
             self.summary.take(t_s, event);

@@ -194,6 +194,7 @@ fn summary(run: &Run, scenario: Option<&Scenario>) -> Summary {
         moving_s: between(|row| row.t_s),
         total_s: run.rows.last().map_or(0.0, |row| row.t_s),
         travel_mm: between(|row| row.position_mm).abs(),
+        position_sigma_mm: run.rows.last().and_then(|row| row.position_sigma_mm),
         gap_ref_mm: gap_ref_mm.unwrap_or(unknown),
         max_gap_mm: unknown,
         slip_mm: unknown,

@@ -124,6 +124,9 @@ pub struct Summary {
     pub cut_off_s: Option<f64>,
     /// Distance travelled, mm.
     pub travel_mm: f64,
+    /// One sigma of the position at the end by the controller, mm; none if nothing bears it out.
+    #[serde(default)]
+    pub position_sigma_mm: Option<f64>,
     /// Reference gap of the schedule, mm.
     pub gap_ref_mm: f64,
     /// Largest gap at a step, or separation elsewhere, mm; none (`NaN`) without a crossing.

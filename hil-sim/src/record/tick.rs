@@ -225,7 +225,7 @@ macro_rules! controller {
                     drive_code: sensors.bridges.map(|codes| codes.drive.get()),
                     pretightener_code: sensors.bridges.map(|codes| codes.pretightener.get()),
                     command: codes::of_command(flags.command()),
-                    flags: flags.to_bits(),
+                    flags: flags.0,
                     $($column: Cell::of(seen.$field),)*
                     drive_duty: f64::from(seen.drive.to_bits()) / DUTY,
                     pretightener_duty: f64::from(seen.pretightener.to_bits()) / DUTY,
@@ -280,7 +280,7 @@ impl Default for Controller {
 impl Controller {
     /// All other inputs and outputs of the tick.
     pub const fn flags(&self) -> Flags {
-        Flags::from_bits(self.flags)
+        Flags(self.flags)
     }
 
     /// The mode; none if the numbers are invalid.
@@ -446,7 +446,7 @@ mod tests {
     #[test]
     fn every_mode_has_a_name_and_comes_back() {
         let held = Fault::ALL.into_iter().map(Mode::FaultHold);
-        for mode in Mode::WITHOUT_FAULT.into_iter().chain(held) {
+        for mode in Mode::WITHOUT_FAULT.map(|(mode, _)| mode).into_iter().chain(held) {
             let (number, retracts, fault) = split(mode);
             let tick = Controller { mode: number, retracts, fault, ..Controller::default() };
             assert_eq!(tick.mode(), Some(mode));

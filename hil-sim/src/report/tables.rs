@@ -31,6 +31,7 @@ pub(super) fn summary(s: &Summary) -> String {
         ("In motion", with_unit(s.moving_s, 3, "s")),
         ("From boot to end", with_unit(s.total_s, 3, "s")),
         ("Travel", with_unit(s.travel_mm, 2, "mm")),
+        ("Position at the end, one sigma", with_unit(s.position_sigma_mm, 2, "mm")),
         (
             if s.measured { "Worst measured gap" } else { "Worst gap" },
             with_unit(s.max_gap_mm, 4, "mm"),

@@ -56,12 +56,13 @@ fn a_crossing_at_resonance_shows_vibration() {
     let quiet = shaken(&Scenario::default());
     assert_eq!(quiet.len(), 3);
     assert!(quiet.iter().all(|&um| um > 0.0 && um < 2.5), "{quiet:?}");
-    // Without the guard, and with a gearbox whose ripple at crossing speed is the mode.
+    // Without the guard, and with a gearbox whose ripple at crossing speed is the mode. The tread
+    // turns faster than that by what it gives way by.
     let mut loud = Scenario::default();
     loud.rig.drive.guard_band = 0.0;
-    loud.rig.drive.ripple_pitch_mm = 8.0 / 276.0;
+    loud.rig.drive.ripple_pitch_mm = 8.2 / 276.0;
     let loud = shaken(&loud);
-    assert!(loud.iter().all(|&um| um > 6.0), "{loud:?}");
+    assert!(loud.iter().zip(&quiet).all(|(loud, quiet)| *loud > 3.0 * quiet), "{loud:?}");
 }
 
 #[test]

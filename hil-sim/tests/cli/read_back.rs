@@ -52,7 +52,7 @@ fn a_captured_log_reports_what_was_measured_and_calls_nothing_true() {
     let output = good_in(at, &["report", "log.mcap", "--out", "page.html"]);
     let text = stdout(&output).split_whitespace().collect::<Vec<_>>().join(" ");
     assert!(text.contains("worst measured gap 2."), "{text}");
-    assert!(text.contains("the reference of 2.653 mm"), "{text}");
+    assert!(text.contains("the reference of 2.663 mm"), "{text}");
     assert!(text.contains("measured slip"), "{text}");
     assert!(!text.contains("gross slip"), "{text}");
     let page = std::fs::read_to_string(at.join("page.html")).unwrap();

@@ -86,9 +86,9 @@ impl Moment {
         !self.drive.enable && !self.preload.enable
     }
 
-    /// Neither carriage nor wheel moves.
+    /// The wheel stands and grips; its axle may still sink on the rubber.
     pub(crate) fn is_still(&self) -> bool {
-        self.truth.speed_mm_s == 0.0 && self.truth.tread_mm_s == 0.0
+        self.truth.rigid_mm_s.abs() < 1e-6 && self.truth.tread_mm_s == 0.0
     }
 }
 

@@ -74,7 +74,10 @@ pub(crate) fn found(seed: u64, mut book: impl FnMut(&str, &dyn Fn(&mut Line))) {
 /// How widely the hidden parameters of a seed are drawn about the nominal rig.
 fn widened(seed: u64) -> Scenario {
     let wide = include_str!("hidden.toml");
-    Scenario::parse("hidden.toml", wide, &[format!("run.seed={seed}")]).expect("a scenario")
+    let part = ChaCha8Rng::seed_from_u64(seed ^ 0x5ea2).random::<f64>();
+    let compliance = format!("mismatch.wind_up_compliance={}", 0.7 * 2f64.powf(part));
+    let sets = [format!("run.seed={seed}"), compliance];
+    Scenario::parse("hidden.toml", wide, &sets).expect("a scenario")
 }
 
 /// The hidden values by the names under which three deployments identify them.
@@ -86,6 +89,7 @@ fn hidden(p: &PlantParameters, known: &Scenario, zeros: (f64, f64)) -> Vec<(Stri
         ("tread.stiffening", p.ring.k_0 / p.ring.k_inf),
         ("tread.tau_s", p.ring.tau_s),
         ("plant.mu", p.mu),
+        ("compliance along the wall over nominal", p.wind_up),
         ("plant.top_load_n", p.load_n / known.rig.plant.top_load_share),
         ("drive.no_load_speed_mm_s", p.drive.no_load_mm_s),
         ("sense.angle_zero_code", zero_code),

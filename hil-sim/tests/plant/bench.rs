@@ -27,7 +27,7 @@ pub(crate) fn ideal(preset: &str) -> PlantParameters {
     plant.spring_n_per_mm = 0.0;
     plant.ripple.0 = 0.0;
     plant.arm.coupling = 0.0;
-    plant.elastic_creep = 1e-6;
+    plant.wind_up = 1e-4;
     plant.drive.stall_n = 1e7;
     plant.drive.limit_n = 1e7;
     plant.drive.friction_n = 0.0;

@@ -52,14 +52,14 @@ fn the_drives_work_is_found_again_at_any_load_and_speed() {
         ("fe", None, 12.0, 100.0),
         ("fe", None, -30.0, 100.0),
         ("prototype", Some(15.0), 8.0, 45.0),
-        ("prototype", Some(15.0), -8.0, 45.0),
+        // Where friction suffices.
+        ("prototype", Some(15.0), -8.0, 48.0),
     ] {
-        let plant = nominal(preset);
-        balances(
-            PlantParameters { load_n: load_n.unwrap_or(plant.load_n), ..plant },
-            speed,
-            preload,
-        );
+        for wind_up in [0.3, 1.0, 2.0] {
+            let plant = PlantParameters { wind_up, ..nominal(preset) };
+            let load_n = load_n.unwrap_or(plant.load_n);
+            balances(PlantParameters { load_n, ..plant }, speed, preload);
+        }
     }
 }
 
@@ -86,24 +86,6 @@ fn the_drives_work_is_found_again_with_a_wheel_off_its_axis() {
                 println!("{run_out_mm} mm, {speed} mm/s, {travel} mm: {part:.4}");
                 assert!(part.abs() < 3e-3, "{run_out_mm} mm, {speed} mm/s, {travel} mm: {part}");
             }
-        }
-    }
-}
-
-#[test]
-fn the_drives_work_is_found_again_with_a_tread_that_winds_up() {
-    for (preset, speed, preload) in [
-        ("prototype", 8.0, 33.3),
-        ("prototype", 25.0, 48.0),
-        ("prototype", -8.0, 33.3),
-        ("prototype", -25.0, 33.3),
-        ("fe", 12.0, 100.0),
-    ] {
-        for compliance in [0.3, 1.0, 2.0] {
-            let mut plant = nominal(preset);
-            plant.wind_up = (1.0, compliance);
-            let part = missing(finer(plant), speed, preload, 80.0, 3);
-            assert!(part.abs() < 3e-3, "{speed} mm/s, {preload} N, {compliance}: {part}");
         }
     }
 }

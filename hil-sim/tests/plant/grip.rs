@@ -6,7 +6,7 @@ use hil_sim::scenario::Scenario;
 use hil_sim::session::{Options, run};
 use interstage::fault::Fault;
 
-use crate::common::{NO_SLIP_MM, overridden};
+use crate::common::overridden;
 
 use super::bench::{TICK_S, close, deploy, drive, ideal, nominal, roll, steps};
 
@@ -89,22 +89,25 @@ fn one_wheel_does_not_lift_the_whole_load_by_friction_alone() {
 
 #[test]
 fn the_whole_load_stops_a_run_unless_the_arm_helps() {
-    let summary = |coupling: &str| {
-        let sets = ["plant.top_load_share=1", coupling];
+    let summary = |coupling: &str, friction: &str| {
+        let sets = ["plant.top_load_share=1", coupling, friction];
         run(&overridden("prototype", &sets), Options::default()).unwrap().summary
     };
     for coupling in ["plant.arm_coupling=0", "plant.arm_coupling=-1"] {
-        let stuck = summary(coupling);
+        let stuck = summary(coupling, "plant.mu=1.1");
         // It stops while it slips, and names how far.
         let named = |text: &str| stuck.faults.iter().any(|fault| fault.text == text);
         assert!(!stuck.completed && stuck.slip_mm > 0.5, "{coupling}: {stuck:?}");
         let reasons = [Fault::WheelSlips, Fault::FrictionShort].map(Fault::sentence);
         assert!(reasons.into_iter().any(named), "{coupling}: {stuck:?}");
     }
-    let helped = summary("plant.arm_coupling=1");
-    assert!(helped.completed && helped.slip_mm < NO_SLIP_MM, "{helped:?}");
-    let most = helped.crossings.iter().map(|c| c.peak_utilisation).fold(0.0, f64::max);
-    assert!((1.0..1.1).contains(&most), "{most}");
+    // It needs a little more than 1.1, as the axle swings on its tread: there it slides, and climbs.
+    for friction in ["plant.mu=1.1", "plant.mu=1.2"] {
+        let helped = summary("plant.arm_coupling=1", friction);
+        let most = helped.crossings.iter().map(|c| c.peak_utilisation).fold(0.0, f64::max);
+        assert!(helped.completed && (helped.slip_mm > 0.0) == (most == 1.1), "{helped:?}");
+        assert!((1.1..1.2).contains(&most), "{most}");
+    }
 }
 
 #[test]
@@ -163,10 +166,13 @@ fn the_load_does_not_turn_the_worm() {
             roll(&mut rig, 5.0, 41.0, 10.0, |_| {}).unwrap();
             let idle = Drives { drive_on, ..Drives::default() };
             steps(&mut rig, &idle, 200);
-            let held = rig.truth().position_mm;
+            let held = *rig.truth();
             steps(&mut rig, &idle, 1000);
-            assert_eq!(rig.truth().tread_mm_s, 0.0);
-            assert_eq!(rig.truth().position_mm, held);
+            let truth = rig.truth();
+            assert_eq!((truth.tread_mm_s, truth.rotation_rad), (0.0, held.rotation_rad));
+            // The axle goes on as its tread relaxes under the load, by no more than all of that.
+            let relaxes = (held.position_mm - truth.position_mm) / load;
+            assert!((0.0..1.0 / rig.parameters().shear().n_per_mm).contains(&relaxes), "{relaxes}");
         }
     }
 }

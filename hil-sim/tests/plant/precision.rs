@@ -1,5 +1,7 @@
 //! Error of the usual setting against one twenty times as fine, and how it falls.
 
+use std::f64::consts::PI;
+
 use hil_sim::plant::ledger::Crossing;
 use hil_sim::plant::precision::{FINER, Setting, work_precision};
 use hil_sim::plant::rig::{Drives, Resolution, VirtualRig};
@@ -45,11 +47,17 @@ fn a_crossing_inside_a_deployment_is_within_its_error() {
         let tick_s = TICK_S / FINER as f64;
         let fine = crossings(preset, Setting::usual().finer(FINER), tick_s, drive);
         assert_eq!((usual.len(), fine.len()), (3, 3));
+        // An axle that the step stops at once swings on its tread with this part of its preload. A step
+        // of time damps that by half of its angle: so much it takes off the first overshoot.
+        let (plant, shear, (speed, preload_n)) = (nominal(preset), nominal(preset).shear(), drive);
+        let angle = TICK_S * (1e3 * shear.n_per_mm * shear.stiffening / plant.mass_kg).sqrt();
+        let swing = 1e-3 * plant.mass_kg * angle / TICK_S * speed.abs() / preload_n;
+        let damped = swing * (1.0 - (-0.5 * PI * angle).exp());
         for (usual, fine) in usual.iter().zip(&fine) {
             assert!(off(usual.gap_mm, fine.gap_mm).abs() < 2.5e-3, "{usual:?} {fine:?}");
             assert!(off(usual.corner_n, fine.corner_n).abs() < 3e-3, "{usual:?} {fine:?}");
             let used = [usual, fine].map(|crossing| crossing.peak_utilisation);
-            assert!(off(used[0], used[1]).abs() < 5e-3, "{usual:?} {fine:?}");
+            assert!((used[0] - used[1]).abs() < 5e-3 + damped, "{usual:?} {fine:?} {damped}");
         }
     }
 }

@@ -5,7 +5,8 @@ use hil_sim::plant::sensors::{Codes, Noise, SensorParameters, Sensors};
 use hil_sim::scenario::Scenario;
 use interstage::rig::Rig;
 use interstage::sense::raw::{SensorFrame, SensorId};
-use interstage::sense::{SensedState, Senses, SensesState, Tuning, Validity};
+use interstage::sense::speed::BANDWIDTH_RAD_S;
+use interstage::sense::{SensedState, Senses, SensesState, Validity};
 use interstage::units::MillimetresPerSecond2;
 
 use super::bench::{TICK_S, nominal};
@@ -20,16 +21,10 @@ struct Chain {
 
 impl Chain {
     fn new(noise: Noise) -> Self {
-        let tuning = Tuning {
-            preload_sensor_tau_s: 0.0,
-            tread_tau_s: 0.0,
-            arm_tau_s: 0.0,
-            ..Tuning::default()
-        };
         let parameters = SensorParameters { noise, ..nominal("prototype").sensors };
         Self {
             plant: Sensors::new(parameters, 1),
-            firmware: Senses::try_build_tuned(&Rig::prototype(), &tuning).unwrap(),
+            firmware: Senses::try_build_with(&Rig::prototype(), BANDWIDTH_RAD_S, 0.0).unwrap(),
             state: SensesState::default(),
             now: 0,
         }

@@ -6,9 +6,12 @@ use hil_sim::plant::wall::Wall;
 
 use super::bench::{TICK_S, close, drive, ideal, nominal, pairs, roll, steps};
 
+/// A factor of compliance that makes a tread all but rigid.
+const RIGID: f64 = 1e-3;
+
 /// The plant with a tread that gives way along the wall, this many times as much as its layer.
 fn wound(mut plant: PlantParameters, compliance: f64) -> PlantParameters {
-    plant.wind_up = (1.0, compliance);
+    plant.wind_up = compliance;
     plant
 }
 
@@ -64,51 +67,43 @@ fn at_the_corner(plant: PlantParameters) -> [(f64, f64); 3] {
 
 #[test]
 fn at_lift_off_the_axle_lags_and_then_creeps() {
-    let rigid = at_the_corner(nominal("prototype"));
-    // Tread, axle's lag beyond that of a rigid tread, and creep after it beyond that, mm/mm.
+    // Axle's lag beyond that of a rigid tread, and creep after it beyond that, mm/mm.
     let beyond = |compliance: f64, thickness: f64| {
-        let mut plant = wound(nominal("prototype"), compliance);
-        plant.ring.tread_thickness_mm = thickness;
-        let other = if thickness > 0.0 {
-            let mut rigid = nominal("prototype");
-            rigid.ring.tread_thickness_mm = thickness;
-            at_the_corner(rigid)
-        } else {
-            rigid
-        };
+        let [soft, rigid] = [compliance, RIGID].map(|compliance| {
+            let mut plant = wound(nominal("prototype"), compliance);
+            plant.ring.tread_thickness_mm = thickness;
+            at_the_corner(plant)
+        });
         let more = |n: usize, at: &[(f64, f64); 3]| at[n].1 - at[0].1;
-        let soft = at_the_corner(plant);
-        let lags = more(1, &soft) - more(1, &other);
-        let crept = (more(2, &soft) - more(2, &other) - lags) / 2.0;
+        let lags = more(1, &soft) - more(1, &rigid);
+        let crept = (more(2, &soft) - more(2, &rigid) - lags) / 2.0;
         (lags, crept)
     };
     let nominal = beyond(1.0, 0.0);
     assert!((0.6..0.8).contains(&nominal.0), "{nominal:?}");
     assert!((0.06..0.12).contains(&nominal.1), "{nominal:?}");
     // It follows the thickness, as the page says.
-    for (thickness, lags, crept) in [(5.0, 1.11, 0.20), (8.0, 0.71, 0.18), (12.0, 0.54, 0.17)] {
+    for (thickness, lags, crept) in [(5.0, 1.13, 0.21), (8.0, 0.72, 0.19), (12.0, 0.55, 0.19)] {
         let got = beyond(1.0, thickness);
         assert!((got.0 - lags).abs() < 0.02, "{thickness}: {got:?}");
         assert!((got.1 - crept).abs() < 0.01, "{thickness}: {got:?}");
     }
     // A stiff one is rigid.
-    assert!(beyond(0.01, 0.0).0.abs() < 0.03);
+    assert!(beyond(0.01, 0.0).0.abs() < 0.01);
 }
 
 /// Back over the steps the load pushes the same way: the axle is ahead of the tread.
 #[test]
 fn back_over_a_step_the_axle_is_ahead_of_the_tread() {
     let ahead = |compliance: f64| {
-        let mut plant = nominal("prototype");
-        if compliance > 0.0 {
-            plant = wound(plant, compliance);
-        }
+        let plant = wound(nominal("prototype"), compliance);
         let mut rig = VirtualRig::new(plant, 80.0, 45.0, TICK_S);
         roll(&mut rig, -8.0, 0.5, 30.0, |_| {}).unwrap();
         (lag(&rig) + 80.0, rig.truth().slip_mm)
     };
-    let (soft, rigid) = (ahead(1.0), ahead(0.0));
-    assert!(soft.0 > rigid.0 + 0.3, "{soft:?} {rigid:?}");
+    let (soft, rigid) = (ahead(1.0), ahead(RIGID));
+    // By half a millimetre at each of three steps, and by creep on the wall between.
+    assert!(soft.0 > rigid.0 + 3.0 * 0.5, "{soft:?} {rigid:?}");
     assert_eq!((soft.1, rigid.1), (0.0, 0.0));
 }
 

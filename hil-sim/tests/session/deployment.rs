@@ -8,6 +8,7 @@ use hil_sim::record::{Controller, MODE_NAMES, Summary, Tick, TrueState};
 use hil_sim::scenario::{ControllerKind, Direction, Scenario};
 use hil_sim::session::{Options, run};
 use hil_sim::testing::long;
+use interstage::fault::Limit;
 use rayon::prelude::*;
 
 /// The preload is reached within this part of its reference: the controller's tolerance of
@@ -67,9 +68,10 @@ fn every_drawn_rig_completes_without_fault_or_slip() {
         assert_eq!(odd, None, "{name}");
         let off =
             rows.last().expect("rows").position_mm() - end_mm(scenario, scenario.run.direction);
-        assert!(off.abs() < 0.5, "{name}: {off} mm from the end");
+        let within = if summary.rig == "fe" { 0.7 } else { 0.6 };
+        assert!(off.abs() < within, "{name}: {off} mm from the end");
         // Between cruise speed throughout and 17 mm/s on average.
-        assert!((2.9..4.9).contains(&summary.moving_s), "{name}: {}", summary.moving_s);
+        assert!((2.9..6.6).contains(&summary.moving_s), "{name}: {}", summary.moving_s);
         // The command comes before the preload is built; that takes two seconds at most.
         let before = summary.duration_s.expect("commanded") - summary.moving_s;
         assert!((0.055..2.0).contains(&before), "{name}: {before}");
@@ -88,7 +90,10 @@ fn a_rig_at_its_bounds_is_crossed_without_slip_both_ways() {
         let sets: Vec<String> = sets.split(' ').map(str::to_owned).collect();
         let scenario = Scenario::resolve(Some("prototype"), None, &sets).expect("a scenario");
         let summary = run(&scenario, Options::default()).expect("a run").summary;
-        assert!(summary.completed && summary.slip_mm < NO_SLIP_MM, "{sets:?}: {summary:?}");
+        // Where 210 says that the margin is not to be had it may slip by a tenth.
+        let short = summary.limits.iter().any(|l| l.code == Limit::SlipMarginLow.code());
+        let most = if short { 0.15 } else { NO_SLIP_MM };
+        assert!(summary.completed && summary.slip_mm < most, "{sets:?}: {summary:?}");
     }
 }
 
@@ -133,9 +138,9 @@ fn steps_of_any_height_and_place_are_found_where_they_are() {
         off.sort_by(f64::total_cmp);
         let most = off[(off.len() * 95).div_ceil(100) - 1];
         println!("step {}: mean {mean:.3} mm, 95 % within {most:.3} mm", step + 1);
-        // Of 300 rigs 0.052, 0.088 and 0.111 mm: a lift-off shows its face within 0.055 mm, one
-        // sigma, and over a corner the odometry falls 0.035 mm short.
-        assert!(most < [0.07, 0.10, 0.12][step], "step {}: {most} mm", step + 1);
+        // A lift-off shows its face within 0.055 mm, one sigma; how far the tread gave way before it is
+        // known within a third at the first step, and better from then on.
+        assert!(most < [0.16, 0.27, 0.34][step], "step {}: {most} mm", step + 1);
         assert!(mean.abs() < 0.04, "step {}: {mean} mm on average", step + 1);
     }
 }
@@ -200,7 +205,7 @@ fn the_gap_is_measured_and_predicted() {
             ("prototype", true) => (0.02, 0.05),
             ("fe", true) => (0.03, 0.06),
             ("prototype", false) => (0.03, 0.07),
-            _ => (0.05, 0.14),
+            _ => (0.07, 0.14),
         };
         for line in &summary.crossings {
             for (gap, bound) in
@@ -343,14 +348,17 @@ fn reported_values_follow_the_true_ones() {
         ("radius", |seen, t| (seen.radius_mm, t.radius_true_mm)),
         ("compression", |seen, t| (seen.compression_mm, t.compression_true_mm)),
     ];
-    for Run { name, scenario, rows, nominal, .. } in RUNS.iter() {
+    for Run { name, scenario, rows, nominal, summary, .. } in RUNS.iter() {
         let preload = &scenario.rig.preload;
+        // The position by what the tread gives way by on a corner, more under three times the load.
+        // The sensor shows the wheel's speed, the plant the axle's, which lunges at lift-off.
+        let (gives, lunge) = if summary.rig == "fe" { (1.3, 3.2) } else { (0.7, 2.5) };
         let bounds = if *nominal {
-            // Creep, half a step's residual and a wheel that is not worn yet; six deviations of the noise and a millisecond
-            // of the screw; a code of the angle and 5 ms of lag.
-            [0.35, 0.3 + 1e-3 * preload.slew_n_per_s, 0.2, 0.08]
+            // Six deviations of the noise and a millisecond of the screw; a code of the angle and
+            // 5 ms of lag.
+            [gives, 0.3 + 1e-3 * preload.slew_n_per_s, 0.2, 0.08]
         } else {
-            [0.6, 0.3 + 0.015 * preload.limit_n, 0.35, 0.13]
+            [gives, 0.3 + 0.015 * preload.limit_n, 0.35, 0.13]
         };
         let (mut bias, mut squares, mut moving, mut ticks) = (0.0, 0.0, 0, 0);
         for row in rows.iter().filter(|row| row.controller.mode >= mode("idle")) {
@@ -370,7 +378,7 @@ fn reported_values_follow_the_true_ones() {
         bias /= f64::from(ticks);
         assert!(!nominal || bias.abs() < 0.02, "{name}: preload bias {bias}");
         let speed = (squares / f64::from(moving)).sqrt();
-        assert!(speed < 2.5, "{name}: speed off by {speed} mm/s, rms");
+        assert!(speed < lunge, "{name}: speed off by {speed} mm/s, rms");
     }
 }
 

@@ -245,7 +245,7 @@ fn from_an_unconfirmed_record_it_takes_no_corner_for_a_wall_and_arrives_by_a_ste
         (!good || limits.iter().any(untrue)).then(|| format!("{place}: {mode:?}, {at}, {limits:?}"))
     });
     let unknown = unknown.map(AtomicU64::into_inner);
-    assert!(unknown.iter().all(|runs| 10 * runs <= rigs() + 10), "{unknown:?}");
+    assert!(unknown.iter().all(|runs| 3 * runs <= rigs()), "{unknown:?}");
 }
 
 /// Error of the record when the supply is back, mm: the wheel was moved by hand meanwhile
@@ -333,6 +333,7 @@ fn moved_outwards_it_holds_at_the_sleeve_s_end() {
         session.step(None).expect("runs");
     }
     let truth = session.plant().truth();
-    assert!((truth.position_mm - held.position_mm).abs() < 0.1, "{truth:?} after {held:?}");
+    // Off the stop, its load winds the tread up by as much as it carries: 6.7 N at 19.5 N/mm.
+    assert!((truth.position_mm - held.position_mm).abs() < 0.35, "{truth:?} after {held:?}");
     assert!((truth.preload_n - held.preload_n).abs() < 3.0, "{truth:?} after {held:?}");
 }

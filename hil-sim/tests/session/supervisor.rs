@@ -111,7 +111,7 @@ fn check(before: Mode, output: &Output) -> Result<(), String> {
 #[test]
 fn every_mode_of_a_run_is_among_the_snapshots() {
     let found: Vec<Mode> = snapshots().into_iter().map(|(mode, _)| mode).collect();
-    for mode in Mode::WITHOUT_FAULT {
+    for (mode, _) in Mode::WITHOUT_FAULT {
         assert!(found.contains(&mode), "{mode:?} is missing in {found:?}");
     }
 }

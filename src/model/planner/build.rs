@@ -7,6 +7,7 @@ use crate::model::profile::Profile;
 use crate::model::rollout::{Run, roll};
 use crate::model::timing::{SLEW_PART, Timing};
 use crate::model::tread::{Axial, Tread, TreadState};
+use crate::model::wind_up::Shear;
 use crate::numeric::{checked, divide};
 use crate::rig::{CROSSOVER_RAD_S, MAX_STEPS, PROPORTIONAL, Rig, RigError};
 use crate::units::{Direction, Millimetres, MillimetresPerSecond, Newtons, Q16, Ratio, q16};
@@ -46,13 +47,14 @@ impl Planner {
         let first = tangents.first().map_or(0.0, |tangent: &Ratio| tangent.to_num::<f64>());
         let first = rig.plant.arm_coupling * load * first;
         let load_n = checked("plant.top_load_n", load)?;
+        let shear = Shear::try_build(rig)?;
         let gap_ref = [Direction::Deploy, Direction::Retract].map(|direction| {
             if rig.control.gap_ref_mm > 0.0 {
                 return checked("control.gap_ref_mm", rig.control.gap_ref_mm);
             }
             let speed = checked("control.safe_speed_mm_s", rig.control.safe_speed_mm_s)?;
             let force = checked("preload.cruise_n", rig.preload.cruise_n + first)?;
-            Ok(steady_gap(&tread, direction, load_n, speed, force))
+            Ok(steady_gap((&tread, shear), direction, load_n, speed, force))
         });
         let [deploy, retract] = gap_ref;
         let (deploy, retract) = (deploy?, retract?);
@@ -67,6 +69,7 @@ impl Planner {
         let answers = 1.0 + PROPORTIONAL;
         Ok(Self {
             tread,
+            shear,
             profile: Profile::try_build(rig)?,
             timing: Timing::try_build(rig)?,
             drive: DriveModel {
@@ -117,7 +120,7 @@ impl Planner {
 
 /// Gap of a crossing at a constant speed under a constant radial force, mm.
 fn steady_gap(
-    tread: &Tread,
+    (tread, shear): (&Tread, Shear),
     direction: Direction,
     load: Newtons,
     speed: MillimetresPerSecond,
@@ -128,8 +131,15 @@ fn steady_gap(
         Direction::Deploy => (-reach, Q16::ZERO),
         Direction::Retract => (reach.half(), -reach),
     };
-    let run =
-        Run { direction, axial: Axial::Driven(load), scale: Q16::ONE, level: false, from, until };
+    let run = Run {
+        direction,
+        axial: Axial::Driven(load),
+        scale: Q16::ONE,
+        level: false,
+        shear: Some(shear),
+        from,
+        until,
+    };
     roll(tread, &mut TreadState::default(), &run, |_| (speed, force)).lift.gap
 }
 

@@ -9,6 +9,7 @@ use crate::model::plan::PLAN_TICKS;
 use crate::model::profile::ProfileState;
 use crate::model::rollout::{LEAST_SPEED, LiftOff};
 use crate::model::tread::{Axial, Drive, TreadState};
+use crate::model::wind_up::Spread;
 use crate::numeric::divide;
 use crate::units::{
     Direction, Millimetres, MillimetresPerSecond, Newtons, Q16, Ratio, Seconds, per_tick, q16,
@@ -95,6 +96,7 @@ impl Planner {
         let along = |position: Millimetres| if forward { -position } else { position };
         let braking = self.timing.brake_distance(scene.cruise, approach.window_speed);
         let looks = approach.window_from + braking;
+        let sense = if forward { Q16::ONE } else { -Q16::ONE };
         let touches = match scene.direction {
             Direction::Deploy => self.touch_at,
             Direction::Retract => Q16::ZERO,
@@ -105,6 +107,7 @@ impl Planner {
             axial: Axial::Driven(scene.load),
             pressed: Q16::ZERO,
             duration: Q16::ZERO,
+            gives: Q16::ZERO,
             scale: scene.scale,
             level: false,
         };
@@ -153,6 +156,8 @@ impl Planner {
         let mut carried = Q16::ZERO;
         let mut overshot = Q16::ZERO;
         let (mut here, mut speed) = (from, Q16::ZERO);
+        // The tread gives way against its load; the drive makes up for it later.
+        let (mut winding, mut spread) = (self.shear.rest(scene.load), Spread::default());
         for stride in 0..MOST_STRIDES {
             if stride % STRIDES_AT_ONCE == 0 {
                 pause().await;
@@ -174,6 +179,10 @@ impl Planner {
                 let passed = follower.step(self, approach, scene, distance);
                 let travel = Q16::narrow(per_tick(follower.speed())) * Q16::from_num(passed);
                 left -= travel;
+                for _ in 0..passed {
+                    spread.step();
+                    left -= sense * Q16::narrow(spread.gives);
+                }
                 distance -= travel * per_tread;
                 ticks += passed;
             }
@@ -186,7 +195,10 @@ impl Planner {
             drive.pressed = preload(ticks_in_all, follower.felt) + scene.arm_thrust;
             let contact = self.tread.advance(state, &drive);
             let now = along(contact.position);
-            per_tread = divide(here - now, self.tread.stride());
+            per_tread = divide(here - now, self.tread.stride() - drive.gives);
+            let stride = (self.tread.stride(), drive.duration);
+            drive.gives = sense * self.shear.follow(&mut winding, &contact, stride);
+            spread.owes += (sense * drive.gives).widen();
             here = now;
             // The stride's remainder lies ahead.
             distance = now - left;
@@ -199,7 +211,7 @@ impl Planner {
             }
             carried = contact.axial;
             lift.follow(&self.tread, scene.direction, &contact);
-            speed = divide(self.tread.stride() * per_tread, drive.duration);
+            speed = follower.speed() * per_tread;
             if lift.is_found() {
                 break;
             }

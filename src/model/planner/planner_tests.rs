@@ -61,7 +61,8 @@ fn reviewed(wider: f64, trusted: bool) -> Outcome {
 
 #[test]
 fn the_gap_of_a_review_is_that_of_a_plan_which_crosses_likewise() {
-    // Rolled through its own history the planned crossing has the planned gap.
+    // Rolled through its own history the planned crossing has the planned gap, but that the wheel, and
+    // not the axle, then has the speed.
     let planner = planner();
     let predicted = reviewed(0.0, false).gap_predicted.to_num::<f64>();
     let speed = Planner::try_build_as(&Rig::prototype(), Strategy::Limit)
@@ -69,7 +70,7 @@ fn the_gap_of_a_review_is_that_of_a_plan_which_crosses_likewise() {
         .expect("a sound rig");
     let plan = speed.plan(&request(Direction::Deploy));
     let planned = plan.gap.to_num::<f64>();
-    assert!((predicted / planned - 1.0).abs() < 0.02, "{predicted} {planned}");
+    assert!((predicted / planned - 1.0).abs() < 0.03, "{predicted} {planned}");
     assert!(planned < 1.05 * planner.gap_ref(Direction::Deploy).to_num::<f64>(), "{planned}");
 }
 
@@ -320,9 +321,9 @@ fn a_plan_names_what_keeps_the_crossing_from_being_faster() {
     };
     assert_eq!(by(&|_| (), Direction::Deploy), LimitedBy::Preload);
     assert_eq!(by(&|_| (), Direction::Retract), LimitedBy::Drive);
-    let little = |rig: &mut Rig| rig.plant.mu = 0.84;
+    let little = |rig: &mut Rig| (rig.plant.mu, rig.plant.top_load_share) = (0.85, 0.7);
     assert_eq!(by(&little, Direction::Deploy), LimitedBy::Friction);
-    let narrow = |rig: &mut Rig| rig.control.gap_ref_mm = 2.3;
+    let narrow = |rig: &mut Rig| rig.control.gap_ref_mm = 2.1;
     assert_eq!(by(&narrow, Direction::Deploy), LimitedBy::LeastSpeed);
 }
 

@@ -31,8 +31,8 @@ const STIFFER: Ratio = q16(1_100_000);
 const LN_STIFFER: Ratio = q16(95_310);
 /// Least relative change of a gap with the logarithm of the stiffness.
 const LEAST_SENSITIVITY: Ratio = q16(100_000);
-/// One sigma of a measured gap against the rolled one, mm: two readings of an arm angle of at most
-/// 0.056 mm a code make 0.023, a rollout's 0.7 % 0.018, the preload sensor's 1.5 % 0.02.
+/// One sigma of a measured gap against the rolled one, mm: two readings of an arm angle of 0.056 mm
+/// a code make 0.023, a rollout's 0.7 % 0.018, and the preload sensor's 1.5 % 0.02.
 const MEASURED_WITHIN: Millimetres = q16(36_000);
 /// Largest difference of the logarithm of a stiffness that one crossing may show.
 const MOST_OFF: Ratio = q16(1_000_000);
@@ -63,6 +63,7 @@ impl Planner {
             axial: Axial::Driven(load),
             pressed: first.pressed(),
             duration: Q16::ZERO,
+            gives: Q16::ZERO,
             scale,
             level: false,
         };
@@ -70,10 +71,14 @@ impl Planner {
         let before = if review.direction == Direction::Deploy { -before } else { before };
         self.tread.put_down(state, from + before, &drive);
         let mut lift_off = LiftOff::default();
+        let mut winding = self.shear.rest(load);
+        let sense = Q16::from_num(review.direction.sign());
         let mut roll = |state: &mut TreadState, stride: HistoryStride| {
             drive.pressed = stride.pressed();
             drive.duration = ticks_to_seconds(stride.ticks());
             let contact = self.tread.advance(state, &drive);
+            let stride = (self.tread.stride(), drive.duration);
+            drive.gives = sense * self.shear.follow(&mut winding, &contact, stride);
             lift_off.follow(&self.tread, review.direction, &contact);
             lift_off.is_found()
         };

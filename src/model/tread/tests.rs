@@ -12,7 +12,7 @@ fn rolled(direction: Direction, load: Option<f64>, scale: f64, speed: f64, force
     };
     let axial = load.map_or(Axial::Pushed, |load| Axial::Driven(Q16::from_num(load)));
     let scale = Q16::from_num(scale);
-    let run = Run { direction, axial, scale, level: true, from, until };
+    let run = Run { direction, axial, scale, level: true, shear: None, from, until };
     let mut state = TreadState::default();
     roll(&tread, &mut state, &run, |_| (Q16::from_num(speed), Q16::from_num(force))).lift
 }
@@ -55,6 +55,7 @@ fn a_wheel_that_is_put_down_sinks_in_as_far_as_its_relaxed_tread_carries() {
                 axial: Axial::Pushed,
                 pressed: Q16::from_num(force),
                 duration: Q16::ZERO,
+                gives: Q16::ZERO,
                 scale: Q16::ONE,
                 level: true,
             };
@@ -84,6 +85,7 @@ fn a_tread_that_rolls_around_an_edge_runs_farther_than_its_axle() {
                 axial: Axial::Pushed,
                 scale: Q16::from_num(scale),
                 level,
+                shear: None,
                 from: Q16::from_num(from),
                 until: Q16::from_num(until),
             };
@@ -142,6 +144,7 @@ proptest! {
             axial: Axial::Driven(Q16::from_bits(load)),
             pressed: Q16::from_bits(pressed),
             duration: Q16::from_bits(duration),
+            gives: Q16::from_bits(scale),
             scale: Q16::from_bits(scale),
             level: false,
         };

@@ -43,11 +43,11 @@ impl Flash {
     }
 
     /// How the operation goes: done, cut short, or never begun.
-    fn operate(&mut self) -> Result<bool, FlashFault> {
+    fn operate(&mut self) -> Result<bool, Refusal> {
         self.operations += 1;
         match &mut self.left {
             None => Ok(true),
-            Some(0) => Err(FlashFault),
+            Some(0) => Err(Refusal::Flash),
             Some(left) => {
                 *left -= 1;
                 Ok(*left > 0)
@@ -65,7 +65,7 @@ impl SetMemory for Flash {
         self.torn.iter().all(|(torn, _)| *torn != slot as usize)
     }
 
-    async fn erase(&mut self, slot: Slot, page: usize) -> Result<(), FlashFault> {
+    async fn erase(&mut self, slot: Slot, page: usize) -> Result<(), Refusal> {
         let complete = self.operate()?;
         let range = page * PAGE_BYTES..(page + 1) * PAGE_BYTES;
         self.torn.retain(|(in_slot, at)| *in_slot != slot as usize || !range.contains(at));
@@ -76,7 +76,7 @@ impl SetMemory for Flash {
             let bits = if complete { u64::MAX } else { self.random() };
             self.slots[slot as usize][at] |= bits as u8;
         }
-        if complete { Ok(()) } else { Err(FlashFault) }
+        if complete { Ok(()) } else { Err(Refusal::Flash) }
     }
 
     async fn program(
@@ -84,7 +84,7 @@ impl SetMemory for Flash {
         slot: Slot,
         offset: usize,
         word: [u8; WORD_BYTES],
-    ) -> Result<(), FlashFault> {
+    ) -> Result<(), Refusal> {
         assert!(offset.is_multiple_of(WORD_BYTES), "{offset}");
         let complete = self.operate()?;
         let kept = if complete { 0 } else { self.random() };
@@ -96,7 +96,7 @@ impl SetMemory for Flash {
         for (index, (to, from)) in place.iter_mut().zip(word).enumerate() {
             *to = from | (kept >> (8 * index)) as u8;
         }
-        if complete { Ok(()) } else { Err(FlashFault) }
+        if complete { Ok(()) } else { Err(Refusal::Flash) }
     }
 }
 

@@ -4,9 +4,9 @@
 use super::{Drives, VirtualRig};
 use crate::plant::actuators::Turn;
 use crate::plant::balance::{Axial, Solved};
-use crate::plant::grip::{Gives, Grip};
+use crate::plant::grip::Grip;
 use crate::plant::ring::Contact;
-use crate::plant::wind_up::WindUp;
+use crate::plant::wind_up::{WindUp, Winding};
 
 /// Carrying less of its friction than this part for radial load, a wheel that spins at an
 /// end stop is as good as jammed by the arm: it stands.
@@ -14,10 +14,6 @@ const JAMMED_BELOW: f64 = 0.25;
 
 /// Travel over which the wheel's rise is learned, mm.
 const LEARNING_MM: f64 = 1.0;
-
-/// Travel over which a tread that is rigid along the wall takes up another rolling motion, mm.
-/// Chosen.
-const RELAXATION_MM: f64 = 0.1;
 
 /// Largest distance of a stride's end from its prediction, mm.
 const OFF_PREDICTION_MM: f64 = 0.01;
@@ -51,7 +47,7 @@ pub(super) struct Stride {
     predicted: (f64, f64),
     /// An end stop holds the carriage.
     stopped: bool,
-    gives: Gives,
+    winding: Winding,
 }
 
 impl Stride {
@@ -102,20 +98,14 @@ impl VirtualRig {
         let shear = p.shear();
         if turn.free_mm_s != 0.0 && self.latched {
             self.latched = false;
-            if shear.gives_way() {
-                // The latch lets go as the tread takes over the load.
-                self.wind_up = WindUp::steady(&shear, p.load_n, 0.0, self.contact_mm);
-            }
+            // The latch lets go as the tread takes over the load.
+            self.wind_up = WindUp::steady(&shear, p.load_n, 0.0, self.contact_mm);
         }
         let (normal, cosine, sine) = self.forces;
         let rolling = self.imposed_speed_mm_s.unwrap_or(tread).abs();
         let grip = Grip {
             mu: p.friction_at(self.truth.position_mm),
-            gives: if shear.gives_way() {
-                Gives::WindsUp(self.wind_up.over(&shear, rolling, self.contact_mm, dt_s))
-            } else {
-                Gives::Creeps { creep: p.elastic_creep, rolling }
-            },
+            winding: self.wind_up.over(&shear, rolling, self.contact_mm, dt_s),
             load_n: p.load_n,
             inertia: 1e-3 * p.mass_kg / dt_s,
             speed: self.truth.speed_mm_s,
@@ -136,7 +126,7 @@ impl VirtualRig {
             turn,
             predicted,
             stopped: false,
-            gives: grip.gives,
+            winding: grip.winding,
         };
         if self.latched {
             return stride;
@@ -249,11 +239,7 @@ impl VirtualRig {
         );
         let rolled = self.mean(before, tread) * stride.dt_s;
         let dt_s = stride.dt_s;
-        let taken_up = match stride.gives {
-            Gives::Creeps { .. } => -(-rolled.abs() / RELAXATION_MM).exp_m1(),
-            Gives::WindsUp(_) => 1.0,
-        };
-        self.advance += taken_up * (self.advance() - self.advance);
+        self.advance = self.advance();
         self.sliding = sliding > 0.0;
         self.tread_load_n = tread_load_n;
         let truth = &mut self.truth;
@@ -263,19 +249,16 @@ impl VirtualRig {
             Moves::Driven(grip) | Moves::Free(grip) => grip.creeps(tread, speed, traction_n),
             Moves::Latched | Moves::Spins(_) => tread - speed,
         };
+        truth.rigid_mm_s = tread - creep;
         truth.friction_work_mj += truth.utilisation.abs() * normal * (creep.abs() * dt_s);
         truth.work_mj += (stride.motor_force_n(tread_load_n) * rolled).max(0.0);
-        if let Gives::WindsUp(winding) = stride.gives {
-            self.wind_up = winding.end(traction_n);
-        }
+        self.wind_up = stride.winding.end(traction_n);
     }
 
     /// Winds the tread up as it is in steady rolling against the load.
     pub(super) fn wind_steadily(&mut self) {
         let (shear, speed) = (self.parameters.shear(), self.truth.tread_mm_s.abs());
-        if shear.gives_way() {
-            self.wind_up = WindUp::steady(&shear, self.thrust_n, speed, self.contact_mm);
-        }
+        self.wind_up = WindUp::steady(&shear, self.thrust_n, speed, self.contact_mm);
     }
 
     /// Lever of the friction, as normal force, N: traction at the tread is its part by the

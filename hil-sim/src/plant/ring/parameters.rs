@@ -20,6 +20,8 @@ pub struct RingParameters {
     /// Thickness of the tread, a layer of incompressible rubber bonded to the hub, mm;
     /// 0: independent elements, of no thickness.
     pub tread_thickness_mm: f64,
+    /// Thickness of the rubber by which independent elements give way along the wall, mm.
+    pub layer_mm: f64,
     /// Spread s of two relaxations of equal share, at `tau_s / s` and `tau_s s`; 1: one.
     pub second_relaxation: f64,
 }
@@ -37,6 +39,7 @@ impl RingParameters {
             tau_s: rig.tread.tau_s,
             elements,
             tread_thickness_mm: 0.0,
+            layer_mm: rig.tread.thickness_mm,
             second_relaxation: 1.0,
         }
     }

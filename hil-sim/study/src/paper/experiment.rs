@@ -23,6 +23,7 @@ use crate::reference::beam::BeamError;
 use crate::reference::vibration::Modal;
 use hil_sim::plant::rig::VirtualRig;
 use hil_sim::report::axis::extent;
+use hil_sim::scenario::Scenario;
 use hil_sim::session::{Options, RunningRig, Session};
 
 /// Crossings of a deployment.
@@ -116,9 +117,13 @@ pub fn run_all(cases: &[Case], done: &(dyn Fn() + Sync)) -> Result<Vec<Experimen
 
 /// One deployment of the rig that `seed` draws.
 pub fn run(case: &Case, seed: u64) -> Result<Run> {
-    let scenario = case.scenario(seed);
+    run_as(case, &case.scenario(seed))
+}
+
+/// One deployment of a case by the rig of this scenario.
+pub(super) fn run_as(case: &Case, scenario: &Scenario) -> Result<Run> {
     let options = Options { speed: Some((case.speed_mm_s, true)), ..Options::default() };
-    let mut session = Session::new(&scenario, options)?;
+    let mut session = Session::new(scenario, options)?;
     let mut watch = Watch::new(case, session.plant())?;
     let mut start = Some(Command::Start);
     while session.time_s() < LONGEST_S {
