@@ -66,6 +66,8 @@ fn a_wide_campaign_names_what_it_drew_and_where_it_ended() {
     assert!(number(friction, "least") < number(friction, "most"));
     assert!(all["silent"].is_array() && all["later_gap_over_ref"]["p99"].is_number());
     assert!(all["first_gap_over_ref"]["max"].is_number() && all["end_off_mm"]["max"].is_number());
+    // The controller's own sigma bears out where the runs ended.
+    assert!((0.02..4.0).contains(&number(&all["end_off_sigmas"], "max")), "{all}");
     let steps = all["steps_found"].as_array().expect("steps");
     assert!(steps.iter().all(|step| step["index"].is_u64() && step["p95"].is_number()));
     // What is stated and not neutral is not drawn; without --wide nothing is.
