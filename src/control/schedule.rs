@@ -90,7 +90,7 @@ impl Schedule {
         let sight = self.sight(plan, course);
         // To where the corner is felt, by the table or the corner itself.
         let ahead = course.distance.map(|distance| distance - plan.approach.brake_from);
-        let earliest = if course.felt { ahead } else { ahead.map(|at| at - steps.tolerance()) };
+        let earliest = if course.felt { ahead } else { ahead.map(|at| at - steps.tolerance) };
         let ramping = course.ramping
             || course.critical
             || earliest.is_some_and(|at| {

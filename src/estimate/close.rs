@@ -12,10 +12,11 @@ use crate::units::{Direction, Millimetres, Q16, q16};
 const HEIGHT_SEEN: Millimetres = q16(120_000);
 
 impl Estimator {
-    /// Largest residual of a step that is where the table has it, mm: its tolerance and three sigma of
-    /// the position, which are independent.
+    /// Largest residual of a step that is where the table has it, mm: its tolerance, and what the
+    /// position is off by in 99 of 100, which are independent.
     pub(super) fn tolerated(&self, state: &EstimateState) -> Millimetres {
-        let (tolerance, off) = (self.steps.tolerance(), self.sigma(state) * q16(3_000_000));
+        let off = state.odometry.spread(state.position) * q16(2_576_000);
+        let tolerance = self.steps.tolerance;
         sqrt(tolerance * tolerance + off * off)
     }
 
@@ -65,7 +66,7 @@ impl Estimator {
 
     /// A step whose wall behind it was not measured.
     pub(super) fn as_table(&self, gap_as_table: Millimetres) -> Measured {
-        let (height, shift) = (self.steps.height(), Q16::ZERO);
+        let (height, shift) = (self.steps.height, Q16::ZERO);
         Measured { height, gap: gap_as_table, gap_as_table, shift, plausible: false }
     }
 
@@ -78,7 +79,7 @@ impl Estimator {
         measured: &Measured,
         found: &mut Findings,
     ) {
-        let higher = measured.height - self.steps.height();
+        let higher = measured.height - self.steps.height;
         state.raised += higher * Q16::from_num(state.direction.sign());
         let Some(mut open) = state.crossing else { return };
         if let Some(mut point) = open.lift {
@@ -122,7 +123,7 @@ impl Estimator {
                 }
                 if higher.abs() > HEIGHT_SEEN {
                     // The height moves the face, and is read on a wall that is not there.
-                    state.odometry.slip(Q16::ZERO, shift);
+                    state.odometry.doubt(shift);
                 }
                 point.face += left;
                 point.residual += left;

@@ -185,7 +185,7 @@ impl Estimator {
             Expectation::Missing => {
                 found.limit(Limit::StepMissing);
                 // Or is it there, and the wheel elsewhere?
-                state.odometry.slip(Q16::ZERO, self.steps.tolerance());
+                state.odometry.slip(Q16::ZERO, self.steps.tolerance);
                 state.missed_in_a_row = state.missed_in_a_row.saturating_add(1);
                 state.missed = match state.direction {
                     Direction::Deploy => state.missed.saturating_add(1),
@@ -318,7 +318,7 @@ impl Estimator {
         let position = position_of_radius(state, sensed);
         let rise = self.watch.rise(&state.watch, state.direction, &seen);
         let fall = match state.direction {
-            Direction::Deploy => self.steps.height() - rise,
+            Direction::Deploy => self.steps.height - rise,
             Direction::Retract => rise,
         } + seen.compression;
         let lag = (sensed.speed.value * FILTER_LAG).widen();

@@ -124,7 +124,7 @@ impl Estimator {
 
     /// Whether a wheel within so much of this position can be as high as it is.
     fn may_be_at(&self, sensed: &SensedState, position: Millimetres, within: Millimetres) -> bool {
-        let within = within + self.steps.tolerance();
+        let within = within + self.steps.tolerance;
         let touch = self.corner().first_contact(Direction::Deploy);
         let behind = |at: Millimetres| Ratio::from_num(self.steps.behind(at));
         let (least, most) = (behind(position - within), behind(position + within + touch));
@@ -150,7 +150,7 @@ impl Estimator {
         if state.known.is_unsure() {
             return self.begin_off(state);
         }
-        let tolerance = self.steps.tolerance();
+        let tolerance = self.steps.tolerance;
         let behind = |step| self.steps.face(step).map(|face| face - state.position);
         let left = match state.direction {
             Direction::Deploy => {

@@ -230,7 +230,7 @@ fn a_place_is_contradicted_by_a_height_a_fifth_of_a_step_off() {
     }
     // Behind the face at 18 mm by its tolerance and by the error of the record; and up already
     // from the corner's first touch on, by the same.
-    let tolerance = estimator().steps.tolerance();
+    let tolerance = estimator().steps.tolerance;
     let touch = estimator().corner().first_contact(Direction::Deploy);
     let behind = |by: i64| q16(18_000_000) + tolerance + q16(by);
     let before = |by: i64| q16(18_000_000) - touch - tolerance - q16(by);
@@ -260,7 +260,7 @@ fn on_a_wall_the_step_ahead_is_the_next_one_and_without_one_nothing_is_searched(
 
 #[test]
 fn up_but_before_the_face_the_wall_is_measured_behind_it() {
-    let tolerance = estimator().steps.tolerance();
+    let tolerance = estimator().steps.tolerance;
     for (next_step, face) in [(2, 18), (3, 40), (0, 62)] {
         for (ahead, leaves) in [(Q16::DELTA, true), (Q16::ZERO, false)] {
             let position = Q16::from_num(face) + tolerance - ahead;

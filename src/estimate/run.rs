@@ -29,7 +29,7 @@ impl Estimator {
         let turned = state.direction != direction;
         state.direction = direction;
         state.leaving = None;
-        state.odometry.begin_run(state.position);
+        state.odometry.begin_run(state.position, turned);
         let carries = self.tread.means(Millimetres::ONE);
         self.pulls.begin(&mut state.wind_up, sensed.travel, load, carries);
         if let Some(open) = state.crossing.as_mut() {
@@ -145,9 +145,9 @@ impl Estimator {
         };
         let on_wall = matches!(state.watch.contact, Contact::Wall | Contact::Leaving);
         // Steps that are not as high as the table has them add up.
-        let off = (sensed.steps_up - Q16::from_num(expected)).abs() * self.steps.height();
+        let off = (sensed.steps_up - Q16::from_num(expected)).abs() * self.steps.height;
         let level =
-            sensed.level == expected || off <= self.steps.height().half() + state.raised.abs();
+            sensed.level == expected || off <= self.steps.height.half() + state.raised.abs();
         if !on_wall || !level || state.known.is_searching() {
             Err(Fault::LevelMismatch)
         } else if state.known.is_unsure() || self.sigma(state) > PLACE_WITHIN {

@@ -276,11 +276,6 @@ impl EstimateState {
         self.watch.contact != Contact::Wall
     }
 
-    /// The step ahead is late.
-    pub const fn is_late(&self) -> bool {
-        self.late
-    }
-
     /// Whether something unexpected asks for crossing speed.
     pub fn slow_down(&self) -> bool {
         let expected = self.crossing.as_ref().is_some_and(|crossing| crossing.expected);

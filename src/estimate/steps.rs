@@ -19,8 +19,10 @@ pub struct Steps {
     /// Positions of the faces from the stow end, mm.
     faces: heapless::Vec<Millimetres, MAX_STEPS>,
     travel: Millimetres,
-    height: Millimetres,
-    tolerance: Millimetres,
+    /// Height of a step by the table, mm.
+    pub(crate) height: Millimetres,
+    /// Half-width of the window in which a step is expected, mm.
+    pub(crate) tolerance: Millimetres,
     /// Distance to the face by which a step must have been detected, deploy and retract, mm.
     detected_by: [Millimetres; 2],
     /// Travel of the wheel over a corner, mm.
@@ -77,16 +79,6 @@ impl Steps {
     /// Number of steps.
     pub fn count(&self) -> u8 {
         self.faces.len() as u8
-    }
-
-    /// Height of a step by the table, mm.
-    pub const fn height(&self) -> Millimetres {
-        self.height
-    }
-
-    /// Half-width of the window in which a step is expected, mm.
-    pub const fn tolerance(&self) -> Millimetres {
-        self.tolerance
     }
 
     /// Travel of the wheel over a corner, mm.
@@ -237,7 +229,7 @@ mod tests {
     fn a_step_is_due_from_its_window_on_and_its_corner_belongs_from_six_millimetres_before() {
         let steps = steps();
         for direction in Direction::ALL {
-            let window = steps.corner.first_contact(direction) + steps.tolerance();
+            let window = steps.corner.first_contact(direction) + steps.tolerance;
             let at = |ahead: Q16| Some(window + ahead);
             assert_eq!(steps.expectation(direction, at(Q16::DELTA)), Expectation::Ahead);
             assert_eq!(steps.expectation(direction, at(Q16::ZERO)), Expectation::Due);
@@ -285,7 +277,7 @@ mod tests {
         }
         let face = q16(18_000_000);
         let ahead = face - steps.touches_within();
-        let behind = face + steps.corner.first_contact(Direction::Retract) + steps.tolerance();
+        let behind = face + steps.corner.first_contact(Direction::Retract) + steps.tolerance;
         assert!(!steps.may_touch(ahead) && steps.may_touch(ahead + Q16::DELTA));
         assert!(steps.may_touch(behind - Q16::DELTA) && !steps.may_touch(behind));
     }

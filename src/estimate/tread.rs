@@ -41,10 +41,6 @@ const OFF_TICKS: u16 = 50;
 const RATIO_WITHIN: Ratio = q16(1_030_000);
 const PER_RATIO: Q16 = q16(4_000_000);
 
-/// Load at rest of a tread as known over the load that its compression means, as a difference
-/// from 1: three deviations of its stiffness, of 4 %.
-const REST_WITHIN: Ratio = q16(120_000);
-
 /// Elements, and their distance over the wheel's radius: 20 mm of the published wheel's tread.
 const ELEMENTS: usize = 32;
 const SPACING: f64 = 1.0 / 40.0;
@@ -304,7 +300,7 @@ impl Tread {
             let rest = core::mem::take(&mut state.rest);
             let seen = tick.direction == Direction::Retract && rest.ticks > OFF_TICKS;
             let (rest, pressed) = (rest.ratio(), tick.pressed);
-            let other = (rest - Ratio::ONE).abs() > REST_WITHIN;
+            let other = (rest - Ratio::ONE).abs() > KNOWN_SCALE - Ratio::ONE;
             let load_sigma = self.load_sigma;
             let shown = Shown { rest, rolled: rest, pressed, load: None, load_sigma };
             return (seen && other).then_some(shown);

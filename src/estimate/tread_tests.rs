@@ -144,7 +144,7 @@ proptest! {
         let got: f64 = shown.stiffness(q16(10_000_000)).to_num();
         let coupled = 1.0 + 4.0 * (ratio - 1.03).max(0.0);
         let exact = match rolled {
-            r if r < 0.9 => coupled.max(2.0 - r),
+            r if r < 0.84 => coupled.max(2.0 - r),
             r => coupled.max(r),
         };
         prop_assert!((got - exact).abs() < 1e-3, "{got} {exact}");

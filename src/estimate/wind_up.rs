@@ -28,7 +28,6 @@ pub(super) struct Pulls {
 pub(super) struct Pulled {
     /// Radial force, and axial load inwards, N.
     pub(super) pressed: Newtons,
-    /// See `pressed`.
     pub(super) load: Newtons,
     /// Compression, mm.
     pub(super) depth: Millimetres,
@@ -97,7 +96,7 @@ impl Pulls {
         state.ticks = 0;
         let from = core::mem::replace(&mut state.from, travel);
         let sinks = pulled.floor - state.winding.sunk;
-        let presses = (pulled.floor + sinks * self.shear.stiffens()).max(Q16::ZERO);
+        let presses = (pulled.floor + sinks * self.shear.stiffens).max(Q16::ZERO);
         let to_load = sqrt(pulled.floor) * presses;
         if pulled.level {
             state.carries = divide(pulled.pressed, to_load.max(LEAST * LEAST));
@@ -155,7 +154,7 @@ impl WindUp {
 
     /// Displacement of the rim against the hub, mm.
     pub(super) const fn displaced(&self) -> Millimetres {
-        self.winding.displaced()
+        self.winding.displaced
     }
 
     /// Travel of the tread that moved no axle, outwards.
@@ -236,7 +235,7 @@ mod tests {
                         bench.tick(speed, load, 0.0);
                     }
                 }
-                let off = [bench.0.winding.displaced().to_num::<f64>() - w, bench.gave() - gave];
+                let off = [bench.0.winding.displaced.to_num::<f64>() - w, bench.gave() - gave];
                 prop_assert!(off.iter().all(|off| off.abs() < 0.02 * 20.0 / k), "{off:?}");
             }
         }

@@ -30,9 +30,9 @@ use search::Search;
 /// One sigma of the logarithm of the stiffness of a tread that has shown before the first crossing
 /// that it is not as known.
 pub const SHOWN_DEVIATION: Ratio = q16(240_000);
-/// Stiffness scale up to which the tread is as known: two deviations. What is off by more is not,
-/// as of the load that the drive shows.
-pub const KNOWN_SCALE: Ratio = q16(1_100_000);
+/// Stiffness scale up to which the tread is as known: four deviations of 4 %, which one of 15,000
+/// exceeds.
+pub const KNOWN_SCALE: Ratio = q16(1_160_000);
 /// Deviations of the stiffness by which the plan takes the tread for stiffer than it seems: five of
 /// six are not stiffer.
 const SIGMAS: Ratio = q16(1_000_000);

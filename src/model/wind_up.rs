@@ -29,7 +29,7 @@ pub struct Shear {
     /// Displacement of the relaxed tread per traction, mm/N.
     compliance: Q16,
     /// Instant over relaxed stiffness, less 1.
-    stiffens: Ratio,
+    pub(crate) stiffens: Ratio,
     /// Reciprocal of the relaxation time, 1/s.
     per_tau: Q16,
     /// Relaxation length over the length of the contact.
@@ -59,7 +59,8 @@ pub struct Pull {
 /// Displacement of the rim against the hub.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Winding {
-    displaced: Millimetres,
+    /// Outwards, mm.
+    pub displaced: Millimetres,
     memory: Millimetres,
     /// What the tread remembers of its compression by the lower wall where it leaves that, and over
     /// all of the patch, mm.
@@ -101,11 +102,6 @@ impl Shear {
     /// Part of a compression that is remembered at which a wall lets go of the tread: `(s - 1) / s`.
     pub fn short(&self) -> Ratio {
         divide(self.stiffens, Ratio::ONE + self.stiffens)
-    }
-
-    /// Instant over relaxed stiffness, less 1.
-    pub const fn stiffens(&self) -> Ratio {
-        self.stiffens
     }
 
     /// A tread that has relaxed under this load, N.
@@ -165,13 +161,6 @@ impl Shear {
         let passes = divide(pull.rolled, pull.patch.max(pull.rolled));
         let renewed = passes * divide(passes, relaxes.max(Q16::DELTA)).min(Ratio::ONE);
         state.sunk = divide(relaxes * pull.floor + state.sunk, Ratio::ONE + relaxes + renewed);
-    }
-}
-
-impl Winding {
-    /// Displacement outwards, mm.
-    pub const fn displaced(&self) -> Millimetres {
-        self.displaced
     }
 }
 

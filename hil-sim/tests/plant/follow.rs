@@ -47,9 +47,9 @@ fn following_the_rotation_and_preload_of_a_run_gives_that_run() {
             height += t.height_mm - b.height_mm;
             count += 1.0;
         }
-        // The arm's modes vanish in the mean; what a step of time leaves grows with it.
+        // The arm's modes vanish in the mean, and most of what a step of time leaves, on corners.
         let mean: f64 = height / count;
-        assert!(mean.abs() < 1.5e-4 * step as f64, "{step}: {mean}");
+        assert!(mean.abs() < 0.1 * SHAKEN_MM * step as f64, "{step}: {mean}");
     }
 }
 
