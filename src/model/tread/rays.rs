@@ -2,7 +2,6 @@
 
 /// Rays behind and ahead of the one straight down: to 0.5 and 1.0 rad.
 pub(super) const BEHIND: i32 = 64;
-/// See [`BEHIND`].
 pub(super) const AHEAD: i32 = 128;
 
 /// Angle between two rays, rad: on the published wheel an element is 0.2 mm of tread.
