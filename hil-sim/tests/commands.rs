@@ -150,17 +150,15 @@ fn a_stop_brings_the_drive_to_rest_and_keeps_the_preload() {
 
 /// Arrived at the end in this direction, unharmed, with no step out of place.
 fn assert_arrived(bench: &Bench, scenario: &Scenario, direction: Direction, name: &str) {
-    let limit = scenario.rig.preload.limit_n;
     assert_eq!(bench.mode(), Mode::Complete(direction.into()), "{name}");
     let off = bench.position_mm() - end_mm(scenario, direction);
     // At three times the load the tread gives way by three times as much.
     let within = if scenario.preset == "fe" { 0.7 } else { 0.5 };
     assert!(off.abs() < within, "{name}: {off} mm from the end");
-    let level = if direction == Direction::Deploy { 3 } else { 0 };
-    assert_eq!(bench.now().seen.level, level, "{name}");
+    assert_eq!(bench.now().seen.level, 3 * u8::from(direction == Direction::Deploy), "{name}");
     assert!(bench.step_codes().is_empty(), "{name}: {:?}", bench.step_codes());
     assert!(bench.now().truth.slip_mm < NO_SLIP_MM, "{name}");
-    assert!(bench.peak_preload_n() <= limit, "{name}: {} N", bench.peak_preload_n());
+    assert!(bench.peak_preload_n() <= scenario.rig.preload.limit_n, "{name}");
 }
 
 /// Three crossings in one direction, each recorded once and near the reference gap.

@@ -54,7 +54,7 @@ const SETTLE_TICKS: u8 = 50;
 /// Geometry of the measurement.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct CrossingWatch {
-    radius: Millimetres,
+    pub(super) radius: Millimetres,
     step: Millimetres,
     /// Baseline of the outermost wall by the table, mm.
     outermost: Millimetres,
@@ -294,11 +294,6 @@ impl CrossingWatch {
                 -self.measure(seen.compression, height + self.step, self.step).distance
             }
         })
-    }
-
-    /// Radius of the undeformed wheel, mm.
-    pub const fn radius(&self) -> Millimetres {
-        self.radius
     }
 
     /// Distance from a face at which an undeformed wheel on this ground touches its edge, mm, over the

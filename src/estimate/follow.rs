@@ -78,7 +78,7 @@ impl Estimator {
             Some(CrossingEvent::Touched) => self.touched(state, tick, &mut found),
             Some(CrossingEvent::Released) => state.crossing = None,
             Some(CrossingEvent::Lifted(lift)) => self.lifted(state, tick, lift, &mut found),
-            Some(CrossingEvent::Passed) => passed(state),
+            Some(CrossingEvent::Passed) => state.pass(),
             Some(CrossingEvent::GapClosed { height, gap, gap_as_table, shift, plausible }) => {
                 let measured = Measured { height, gap, gap_as_table, shift, plausible };
                 self.close(state, tick.sensed, &measured, &mut found);
@@ -347,7 +347,7 @@ impl Estimator {
             }
             return;
         }
-        let radius = self.watch.radius();
+        let radius = self.watch.radius;
         let lost = match state.direction {
             Direction::Deploy => open.slip.step(radius, &at, on_floor),
             Direction::Retract => {
@@ -475,22 +475,6 @@ impl Estimator {
         state.late = false;
         found.advanced = true;
         found.replan = true;
-    }
-}
-
-/// One level on; the arm confirms the count at the end.
-fn passed(state: &mut EstimateState) {
-    let extra = u8::from(state.crossing.as_ref().is_some_and(|open| open.step == 0));
-    state.missed_in_a_row = 0;
-    match state.direction {
-        Direction::Deploy => {
-            state.level = state.level.saturating_add(1);
-            state.extra = state.extra.saturating_add(extra);
-        }
-        Direction::Retract => {
-            state.level = state.level.saturating_sub(1);
-            state.extra = state.extra.saturating_sub(extra);
-        }
     }
 }
 

@@ -27,8 +27,8 @@ const UNKNOWN_CREEP: Ratio = q16(4_080_000);
 /// Variance of where a step is found, over that of its place: as much again by how it is seen. From step
 /// to step that is off by 0.08 to 0.15 mm on virtual rigs as designed, and by 0.16 to 0.26 on wide ones.
 const FOUND: Ratio = q16(2_000_000);
-/// By how much all edges of a sleeve seem farther out than they are, mm, root mean square: rounded by r up
-/// to 0.5 mm, as a wheel that sinks over one sees `0.76 r` of it. On wide virtual rigs 0.21 to 0.35.
+/// By how much all edges of a sleeve seem off together, mm, root mean square. On wide virtual rigs it is
+/// 0.21 deploying and 0.35 retracting; edges rounded by up to 0.5 mm, half of which shows, make 0.14.
 const ROUNDED: Millimetres = q16(220_000);
 /// Variance of how far an edge seems to move under a climbing wheel, over that of a step's place: 0.3 mm,
 /// of a sensor of the mean compression, and of rubber that is thicker than its elements.
@@ -60,7 +60,7 @@ pub struct Odometry {
     gave: [Millimetres; 2],
     /// Covariance of place, scale, creep and winding up.
     covariance: [[Ratio; STATES]; STATES],
-    /// Part by which the position is off where every edge seems so.
+    /// Part of what all edges seem off by that the position has taken over.
     by_edges: Ratio,
     /// Parts of the last residual that the position took over, and each of them.
     share: Ratio,

@@ -264,6 +264,22 @@ impl EstimateState {
         doubtful.then_some(point.held)
     }
 
+    /// One level on; the arm confirms the count at the end.
+    pub(super) fn pass(&mut self) {
+        let extra = u8::from(self.crossing.as_ref().is_some_and(|open| open.step == 0));
+        self.missed_in_a_row = 0;
+        match self.direction {
+            Direction::Deploy => {
+                self.level = self.level.saturating_add(1);
+                self.extra = self.extra.saturating_add(extra);
+            }
+            Direction::Retract => {
+                self.level = self.level.saturating_sub(1);
+                self.extra = self.extra.saturating_sub(extra);
+            }
+        }
+    }
+
     /// The wheel slips on a corner now, or has slipped on it.
     pub fn slips(&self) -> (bool, bool) {
         let on_corner = matches!(self.watch.contact, Contact::Both | Contact::Corner);
