@@ -13,8 +13,8 @@ mod build;
 mod measure;
 
 use self::measure::is_clear;
-use crate::numeric::{LowPass, LowPassState, between, sqrt};
-use crate::units::{Direction, Millimetres, Q16, Travel, q16};
+use crate::numeric::{LowPass, LowPassState, between, divide, sqrt};
+use crate::units::{Direction, Millimetres, Newtons, Q16, Ratio, Travel, q16};
 
 /// Rise above which the baseline is held, mm: two steps of the angle code.
 const HOLD: Millimetres = q16(80_000);
@@ -28,9 +28,6 @@ const TOUCH_TICKS: u8 = 3;
 /// Travel from one sample of the baseline to the next, mm: a wall is averaged over a hundred, 6 mm,
 /// against the 2.8 mm in which a wheel sinks by [`TOUCH`] off an edge, however slow it is.
 const SAMPLE: Travel = q16(60_000).widen();
-/// Fall of the compression below its largest from which the lower wall carries a retracting wheel,
-/// mm: above the sensor's noise.
-const EASES: Millimetres = q16(60_000);
 /// Rise below which a corner is taken for a false alarm, mm.
 const RELEASE: Millimetres = q16(60_000);
 /// Ticks that this must last.
@@ -94,8 +91,9 @@ pub struct WatchState {
     again: u8,
     /// Largest compression of the crossing, mm.
     pub deepest: Millimetres,
-    /// The edge has eased: the lower wall takes a retracting wheel.
-    pub eased: bool,
+    /// Largest compression to 3/2 over the load so far, and the part of it that an edge has lost.
+    edge: Q16,
+    pub(super) eased: Ratio,
     /// Compression on the wall before the step, mm.
     flat: Millimetres,
     lift: Option<Lift>,
@@ -161,6 +159,8 @@ pub struct WatchInput {
     pub radius: Millimetres,
     /// Tread compression, mm.
     pub compression: Millimetres,
+    /// Preload, N.
+    pub pressed: Newtons,
     /// Travel of the tread.
     pub travel: Travel,
     /// A step is expected here: hold the baseline.
@@ -341,7 +341,10 @@ impl CrossingWatch {
         let risen = (direction, seen, self.rise(state, direction, seen));
         if state.contact != Contact::Wall {
             state.deepest = state.deepest.max(seen.compression);
-            state.eased |= state.deepest - seen.compression > EASES;
+            let pressed = seen.pressed.max(Newtons::ONE);
+            let bears = divide(seen.compression * sqrt(seen.compression), pressed);
+            state.edge = state.edge.max(bears);
+            state.eased = Ratio::ONE - divide(bears, state.edge.max(Q16::DELTA));
             if direction == Direction::Retract {
                 self.keep_depth(state, seen);
             }
@@ -485,7 +488,7 @@ impl CrossingWatch {
         state.ticks = 0;
         state.again = 0;
         state.deepest = seen.compression;
-        state.eased = false;
+        (state.edge, state.eased) = (Q16::ZERO, Ratio::ZERO);
         state.lift = None;
         state.depths = [Q16::ZERO; FALLS];
         // On retract the wheel is on the edge alone as soon as it dips.

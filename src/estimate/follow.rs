@@ -133,6 +133,7 @@ impl Estimator {
         let beyond = ahead > most && !on_corner;
         let ahead = if beyond { Q16::ZERO } else { ahead.min(most) };
         let over = state.watch.contact == Contact::Leaving && ahead == Q16::ZERO;
+        let drops = on_corner && !beyond && state.direction == Direction::Retract;
         let floor = if off {
             Q16::ZERO
         } else if beyond || over {
@@ -149,6 +150,7 @@ impl Estimator {
             depth: seen.compression,
             ahead,
             floor,
+            lost: if drops { state.watch.eased } else { Q16::ZERO },
             level: far && self.watch.is_level(&state.watch, state.direction, &seen),
         }
     }
@@ -424,6 +426,7 @@ impl Estimator {
         WatchInput {
             radius: sensed.radius.value,
             compression: sensed.compression_filtered,
+            pressed: sensed.preload_filtered,
             travel: sensed.travel,
             // A search does not know where its step is.
             near: to_window.is_some_and(|ahead| ahead <= Q16::ZERO) && !state.known.is_searching(),

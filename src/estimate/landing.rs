@@ -63,7 +63,7 @@ impl OnEdge {
 /// A retracting wheel as the lower wall took it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Landing {
-    /// Position of the face by the edge, before any slide, mm.
+    /// Position of the face by the edge, before any slide or where the wheel lands, mm.
     pub face: Millimetres,
     /// How far the wheel slides in all, mm; 0 if it rolls.
     pub slid: Millimetres,
@@ -186,6 +186,7 @@ impl Slide {
         let lost = if shown { end.position - face + less + on } else { self.beyond };
         let slid = if shown { slid } else { self.beyond };
         if slid <= SLID {
+            let face = end.position + end.by_largest - end.as_read;
             return Some(Landing { face, slid: Q16::ZERO, lost: Q16::ZERO });
         }
         Some(Landing { face, slid, lost })

@@ -15,7 +15,8 @@ use crate::sense::SensedState;
 use crate::units::{
     Direction, Millimetres, MillimetresPerSecond, Newtons, Q16, Ratio, Tick, Travel, q16,
 };
-
+/// Part of its load that an edge has surely lost to a wall: beyond the noise of the sensors.
+const EASED: Ratio = q16(50_000);
 /// Error of the place at which a lift-off is detected, mm: the steps of the angle code, and the
 /// tolerance of the step's height on a wheel that creeps.
 const LIFT_WITHIN: Millimetres = q16(300_000);
@@ -259,7 +260,7 @@ impl EstimateState {
         let point = self.crossing.as_ref()?.lift?;
         let doubtful = match self.direction {
             Direction::Deploy => (self.position - point.position).abs() < LIFT_WITHIN,
-            Direction::Retract => self.watch.contact == Contact::Both && !self.watch.eased,
+            Direction::Retract => self.watch.contact == Contact::Both && self.watch.eased < EASED,
         };
         doubtful.then_some(point.held)
     }

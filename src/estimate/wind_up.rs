@@ -35,6 +35,8 @@ pub(super) struct Pulled {
     pub(super) ahead: Millimetres,
     /// Compression by the wall below the edge, mm.
     pub(super) floor: Millimetres,
+    /// Part of its load that the edge has lost at least: the wall may lie higher than its table.
+    pub(super) lost: Ratio,
     /// On a wall, far from any edge.
     pub(super) level: bool,
 }
@@ -101,8 +103,8 @@ impl Pulls {
         if pulled.level {
             state.carries = divide(pulled.pressed, to_load.max(LEAST * LEAST));
         }
-        let floor =
-            divide(to_load * state.carries, pulled.pressed.max(Newtons::ONE)).min(Ratio::ONE);
+        let pressed = pulled.pressed.max(Newtons::ONE);
+        let floor = divide(to_load * state.carries, pressed).min(Ratio::ONE).max(pulled.lost);
         let (traction, normal) = self.traction(pulled, floor);
         let pull = Pull {
             traction,
@@ -198,6 +200,7 @@ mod tests {
                 depth: Q16::from_num(DEPTH_MM),
                 ahead: Q16::from_num(ahead),
                 floor: if level { Q16::from_num(DEPTH_MM) } else { Q16::ZERO },
+                lost: Q16::ZERO,
                 level,
             };
             let travel = Travel::from_num(*turned).saturating_sub(state.gave());

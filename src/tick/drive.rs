@@ -96,6 +96,7 @@ impl Controller {
             && !state.approach.sped_up
         {
             targets.speed = targets.speed.min(speed.max(self.least_speed));
+            targets.preload = targets.preload.max(hold.preload);
         }
         // A wheel that slips grips by more preload alone; deploying, it waits for that.
         let (slipping, slipped) = state.estimate.slips();

