@@ -94,20 +94,11 @@ struct Face {
 }
 
 impl Face {
-    /// Least where a slide begins: before it the travel, in it the face moves this on.
-    fn begin(&self) -> Millimetres {
-        self.as_read
-            - self.travelled * MOVES
-            - self.gave * GIVES_OTHERWISE
-            - self.gave * GIVES_OTHERWISE
-    }
-
-    /// Grows in a slide alone, by as much as the wheel slides.
-    fn beyond(&self) -> Millimetres {
-        self.as_read
-            - self.travelled * ROLLS
-            - self.gave * GIVES_OTHERWISE
-            - self.gave * GIVES_OTHERWISE
+    /// What a wheel that rolls cannot move it on by, if it moves it by so many travels: by the fewest
+    /// least where a slide begins, by the most it grows in a slide alone.
+    fn beyond(&self, travels: Ratio) -> Millimetres {
+        let otherwise = self.gave * GIVES_OTHERWISE;
+        self.as_read - self.travelled * travels - otherwise - otherwise
     }
 
     /// Largest where the wheel lands.
@@ -156,14 +147,16 @@ impl Slide {
             position: at.position + edge(at.depth),
             gave: self.gave,
         };
-        let least = self.least.map_or(face.beyond(), |least| least.min(face.beyond()));
+        let beyond = face.beyond(ROLLS);
+        let least = self.least.map_or(beyond, |least| least.min(beyond));
         self.least = Some(least);
-        self.beyond = self.beyond.max(face.beyond() - least);
+        self.beyond = self.beyond.max(beyond - least);
         // On a wheel that creeps noise may look like a landing: a slide behind it still counts.
         if self.landed {
             return None;
         }
-        let begin = self.begin.filter(|begin| begin.begin() <= face.begin()).unwrap_or(face);
+        let begin =
+            self.begin.filter(|begin| begin.beyond(MOVES) <= face.beyond(MOVES)).unwrap_or(face);
         self.begin = Some(begin);
         let most = self.found.map_or(Q16::MIN, |(_, end)| end.end());
         if face.end() >= most {

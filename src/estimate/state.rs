@@ -15,6 +15,7 @@ use crate::sense::SensedState;
 use crate::units::{
     Direction, Millimetres, MillimetresPerSecond, Newtons, Q16, Ratio, Tick, Travel, q16,
 };
+
 /// Part of its load that an edge has surely lost to a wall: beyond the noise of the sensors.
 const EASED: Ratio = q16(50_000);
 /// Error of the place at which a lift-off is detected, mm: the steps of the angle code, and the

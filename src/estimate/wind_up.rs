@@ -4,6 +4,7 @@
 #![deny(clippy::float_arithmetic)]
 
 use super::odometry::Odometry;
+use super::slip::MISSED;
 use crate::model::wind_up::{CONTACT, Pull, Shear, Spread, Winding};
 use crate::numeric::{checked, divide, sqrt};
 use crate::rig::{Rig, RigError};
@@ -35,7 +36,7 @@ pub(super) struct Pulled {
     pub(super) ahead: Millimetres,
     /// Compression by the wall below the edge, mm.
     pub(super) floor: Millimetres,
-    /// Part of its load that the edge has lost at least: the wall may lie higher than its table.
+    /// Part of its load that the edge seems to have lost, to a wall that may lie higher than its table.
     pub(super) lost: Ratio,
     /// On a wall, far from any edge.
     pub(super) level: bool,
@@ -104,7 +105,9 @@ impl Pulls {
             state.carries = divide(pulled.pressed, to_load.max(LEAST * LEAST));
         }
         let pressed = pulled.pressed.max(Newtons::ONE);
-        let floor = divide(to_load * state.carries, pressed).min(Ratio::ONE).max(pulled.lost);
+        // A compression read low falls faster than the load.
+        let least = divide(pulled.lost, Ratio::ONE + MISSED);
+        let floor = divide(to_load * state.carries, pressed).min(Ratio::ONE).max(least);
         let (traction, normal) = self.traction(pulled, floor);
         let pull = Pull {
             traction,
