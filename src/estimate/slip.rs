@@ -10,7 +10,7 @@
 #![deny(clippy::float_arithmetic)]
 
 use super::crossing::HEIGHT_MOST;
-use super::landing::{GIVES_OTHERWISE, OnEdge};
+use super::landing::OnEdge;
 use crate::numeric::{divide, sqrt};
 use crate::units::{Millimetres, Q16, Ratio, Travel, q16};
 
@@ -20,6 +20,9 @@ const CREEPS: Ratio = q16(70_000);
 /// Part of the compression as read that a sensor misses, at most: one of the mean over a patch of
 /// parabolic depth reads two thirds.
 pub(super) const MISSED: Ratio = q16(500_000);
+/// Part by which the tread may give way otherwise than by its model, one sigma: of rubber from 4 to
+/// 16 mm thick that is told as 8.
+const GIVES_OTHERWISE: Ratio = q16(600_000);
 /// Rise of the centre that is noise, mm: three steps of the angle code.
 const NOISE: Millimetres = q16(120_000);
 /// Travel of the tread within which a slip of half of it shows beyond the noise, mm: 0.12 times the

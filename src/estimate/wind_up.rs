@@ -140,7 +140,9 @@ impl Pulls {
         let ahead = pulled.ahead;
         let depth = pulled.depth.max(LEAST);
         let chord = sqrt(depth * (self.radius + self.radius - depth) + ahead * ahead) - ahead;
-        let wall = sqrt(pulled.floor * (self.radius + self.radius));
+        // A wall that lies higher than its table is met all the same.
+        let sunk = pulled.floor.max(depth * floor);
+        let wall = sqrt(sunk * (self.radius + self.radius));
         let all = if ahead > Q16::ZERO { chord + wall + wall * floor } else { chord + chord };
         all * CONTACT
     }
