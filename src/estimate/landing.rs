@@ -11,9 +11,8 @@
 use crate::numeric::{divide, sqrt};
 use crate::units::{Millimetres, Q16, Ratio, Travel, q16};
 
-/// Part of the tread's travel by which the face must move for a slide, or for a wall that carries:
-/// a sensor of the mean compression, creep and coupled rubber move it by a tenth. Without a derivation
-/// between that and a half, with which some slides on virtual rigs go unseen.
+/// Part of the tread's travel by which the face must move for a slide, or for a wall that carries: a sensor
+/// of the mean, creep and coupled rubber move it by a tenth. Without a derivation between that and 0.5.
 const MOVES: Ratio = q16(250_000);
 /// Least slide by the largest compression, mm: what the arm's code makes of an edge's place, three
 /// deviations.
@@ -22,20 +21,16 @@ const SHOWN: Millimetres = q16(90_000);
 const SLID: Millimetres = q16(300_000);
 /// Distance by which the face has moved inwards once the wheel has landed, mm.
 const LANDED: Millimetres = q16(200_000);
-/// Part that the largest compression has in the slide; the rest has the compression as read. A tread
-/// that slides is stiffer, so the first is too little; the wall that carries makes the second too
-/// much. Where between them the slide is, and by which part of it it goes on while the edge hands the
-/// load over to the wall, has no derivation: fitted to 34 slides of virtual rigs, which leaves one
-/// sigma of 0.15 mm. The middle, 0.5, reads slides of 2 mm by a third too large.
+/// Part that the largest compression has in the slide, the rest has the compression as read: a tread that
+/// slides is stiffer, and a wall that carries makes it shallower. By which part a slide goes on while the
+/// edge hands over the load. Fitted to 34 slides of virtual rigs: one sigma of 0.15 mm.
 const BY_LARGEST: Ratio = q16(750_000);
 const GOES_ON: Ratio = q16(600_000);
-/// Travels of the tread by which the face moves at most while a wall takes a wheel that rolls: twice
-/// what a sensor of the mean compression makes of a creeping wheel there on virtual rigs, without a
-/// derivation. Faster is a slide, even if the wall takes the wheel in the middle of it.
+/// Travels of the tread by which the face moves at most while a wall takes a wheel that rolls: twice what a
+/// sensor of the mean makes of a creeping wheel on virtual rigs, without a derivation.
 const ROLLS: Ratio = q16(3_000_000);
-/// Motion of the face in a tick that is none of a slide, however slow the tread is, mm: 5 mm/s. A wheel
-/// that slides is out of balance: it is faster after 0.1 mm at 0.13 m/s2. A tread that relaxes beside a
-/// wheel that hardly turns is slower.
+/// Motion of the face in a tick that is none of a slide, mm: 5 mm/s. A wheel that slides is out of balance,
+/// faster after 0.1 mm at 0.13 m/s2; a tread that relaxes beside a wheel that hardly turns is slower.
 const SINKS: Millimetres = q16(5_000);
 
 /// A wheel on the edge.
@@ -106,7 +101,7 @@ impl Face {
 pub struct Slide {
     travel: Option<Travel>,
     travelled: Millimetres,
-    /// By how much a wheel that rolls may have moved the face, beside the least of a slide and at most, mm.
+    /// By how much a wheel that rolls may have moved the face, beside a slide and at most, mm.
     rolled: [Millimetres; 2],
     /// Largest compression, mm.
     deepest: Millimetres,

@@ -226,6 +226,11 @@ impl EstimateState {
         self.position = self.odometry.position(travel);
     }
 
+    /// The start has a record, and has not located the wheel yet.
+    pub const fn is_recorded(&self) -> bool {
+        matches!(self.known, Position::Recorded(_))
+    }
+
     /// Whether a start could go on from the position.
     pub const fn confidence(&self) -> PositionConfidence {
         let steps_found = self.missed == 0 && self.extra == 0;

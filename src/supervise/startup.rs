@@ -9,12 +9,17 @@ use crate::units::{Millimetres, MillimetresPerSecond, Newtons, q16};
 
 /// Ticks of rest that the self-test watches.
 pub const TEST_TICKS: u32 = 100;
+/// The same where the preload sensor is believed less than a tread, which takes time to be pressed:
+/// five times those in which the published one relaxes.
+pub const SETTLED_TICKS: u32 = 500;
 /// Speed that still counts as rest, mm/s.
 const REST: MillimetresPerSecond = q16(500_000);
 /// Preload that still counts as none, N: the preload sensor's zero before calibration.
-const UNLOADED: Newtons = q16(3_000_000);
+pub const UNLOADED: Newtons = q16(3_000_000);
 /// Compression that still counts as none, mm.
 const UNPRESSED: Millimetres = q16(100_000);
+/// The same with zeros of a record, N and mm: 1 % of the published limit, and what that compresses.
+const KNOWN: (Newtons, Millimetres) = (q16(500_000), q16(20_000));
 
 /// The fault of the first sensor that has not answered with good codes; none if all have.
 pub fn silent(sensed: &SensedState) -> Option<Fault> {
@@ -28,13 +33,14 @@ pub fn at_rest(speed: MillimetresPerSecond) -> bool {
 
 /// Whether the wheel lies unloaded on the outermost wall, so that zeros can be taken. A preload
 /// sensor farther off is believed less than a tread that is pressed by less than half of what it
-/// shows: this compression means `pressed`, N. Its zero is taken as far as `zero_limit`, N.
-pub fn stowed(sensed: &SensedState, pressed: Newtons, zero_limit: Newtons) -> bool {
-    let shown = sensed.preload_filtered;
-    let off = shown.abs() <= zero_limit && pressed < shown.abs().half();
-    sensed.level == 0
-        && (shown.abs() < UNLOADED || off)
-        && sensed.compression_filtered.abs() < UNPRESSED
+/// shows: this compression means `pressed`, N. Its zero is taken as far as `zero_limit`, N. Sensors whose
+/// zeros are `known` by a record show what presses them.
+pub fn stowed(sensed: &SensedState, pressed: Newtons, zero_limit: Newtons, known: bool) -> bool {
+    let shown = sensed.preload_filtered.abs();
+    let off = !known && shown <= zero_limit && pressed < shown.half();
+    let (unloaded, unpressed) = if known { KNOWN } else { (UNLOADED, UNPRESSED) };
+    let none = (shown < unloaded || off) && sensed.compression_filtered.abs() < unpressed;
+    sensed.level == 0 && none
 }
 
 #[cfg(test)]
@@ -72,14 +78,21 @@ mod tests {
             let seen = sensed(level, 0.0, preload, compression);
             let pressed = Q16::from_num(159.5 * compression.max(0.0).powf(1.5));
             assert_eq!(
-                stowed(&seen, pressed, q16(6_000_000)),
+                stowed(&seen, pressed, q16(6_000_000), false),
                 expected,
                 "{level} {preload} {compression}"
             );
         }
         let mut edge = sensed(0, 0.0, 0.0, 0.0);
         edge.compression_filtered = UNPRESSED;
-        assert!(!stowed(&edge, Q16::ZERO, q16(6_000_000)));
+        assert!(!stowed(&edge, Q16::ZERO, q16(6_000_000), false));
+        // A reset under a preload that rises: its tread does not show all of it yet.
+        for (preload, compression, expected) in
+            [(0.4, 0.01, true), (0.6, 0.0, false), (0.0, 0.03, false), (5.5, 0.06, false)]
+        {
+            let seen = sensed(0, 0.0, preload, compression);
+            assert_eq!(stowed(&seen, Q16::ZERO, q16(6_000_000), true), expected, "{preload}");
+        }
     }
 
     #[test]

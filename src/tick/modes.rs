@@ -3,7 +3,7 @@
 use super::serve::view;
 use super::{Controller, Event, State, TickContext};
 use crate::fault::{Fault, Limit};
-use crate::supervise::startup::{TEST_TICKS, at_rest, silent, stowed};
+use crate::supervise::startup::{SETTLED_TICKS, TEST_TICKS, UNLOADED, at_rest, silent, stowed};
 use crate::supervise::{Mode, Trigger, next};
 use crate::units::{Direction, Q16};
 
@@ -90,8 +90,12 @@ impl Controller {
         state.condition_ticks = if rests { state.condition_ticks + 1 } else { 0 };
         if state.condition_ticks >= TEST_TICKS {
             let pressed = self.estimator.means(tick.sensed.compression_filtered);
-            let stowed = stowed(tick.sensed, pressed, self.senses.preload_zero_limit());
-            tick.trigger(Trigger::TestPassed { stowed });
+            let (limit, known) = (self.senses.preload_zero_limit(), state.estimate.is_recorded());
+            let stowed = stowed(tick.sensed, pressed, limit, known);
+            let off = stowed && tick.sensed.preload_filtered.abs() >= UNLOADED;
+            if !off || state.condition_ticks >= SETTLED_TICKS {
+                tick.trigger(Trigger::TestPassed { stowed });
+            }
         } else if state.in_mode >= REST_TICKS {
             tick.fail(Fault::SelfTest);
         }
