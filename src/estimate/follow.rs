@@ -325,8 +325,7 @@ impl Estimator {
         } + seen.compression;
         let lag = (sensed.speed.value * FILTER_LAG).widen();
         let travel = sensed.travel.saturating_sub(lag);
-        let gave = state.odometry.gave();
-        let at = OnEdge { travel, position, fall, depth: seen.compression, gave };
+        let at = OnEdge { travel, position, fall, depth: seen.compression };
         let on_floor = state.watch.contact == Contact::Both;
         // Of a crossing that began in its middle the wall below was not measured.
         let Some(open) = state.crossing.as_mut().filter(|open| !open.turned) else { return };

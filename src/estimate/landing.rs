@@ -44,8 +44,6 @@ pub struct OnEdge {
     pub fall: Millimetres,
     /// Compression, mm.
     pub depth: Millimetres,
-    /// What the tread has given way by outwards so far, by its model, mm.
-    pub gave: Millimetres,
 }
 
 impl OnEdge {
@@ -210,7 +208,6 @@ mod tests {
             let moved = if sliding { 0.01 * (1.0 + rate) } else { 0.01 };
             let jitter = noise * f64::from(tick * 7919 % 101 - 50) / 50.0;
             let at = OnEdge {
-                gave: Q16::ZERO,
                 travel: Travel::from_num(-tread),
                 position: Q16::from_num(18.0 - 6.3 - tread),
                 fall: Q16::from_num(fall + jitter),
@@ -241,7 +238,6 @@ mod tests {
             let fall = R - (reach * reach - past * past).sqrt();
             let off = if tick == 1000 { 0.1 } else { 0.0 };
             let at = OnEdge {
-                gave: Q16::ZERO,
                 travel: Travel::from_num(-rolled),
                 position: Q16::from_num(18.0 - 6.3 - rolled),
                 fall: Q16::from_num(fall - off),
@@ -271,7 +267,6 @@ mod tests {
             let jitter = noise * f64::from(tick * 7919 % 101 - 50) / 50.0;
             let depth = R - past.hypot(R - fall);
             let at = OnEdge {
-                gave: Q16::ZERO,
                 travel: Travel::from_num(-tread),
                 position: Q16::from_num(18.0 - 6.3 - tread),
                 fall: Q16::from_num(fall),

@@ -190,12 +190,6 @@ impl Odometry {
         gains
     }
 
-    /// What the tread gave way by since the origin, by its model, mm.
-    pub(super) fn gave(&self) -> Millimetres {
-        let [crept, wound] = self.gave;
-        crept + wound
-    }
-
     /// The tread creeps and winds up by so much, mm; by how much as far as the steps show.
     pub(super) fn give(&mut self, by: [Millimetres; 2]) -> Millimetres {
         self.gave.iter_mut().zip(by).for_each(|(gave, by)| *gave += by);

@@ -20,9 +20,6 @@ const CREEPS: Ratio = q16(70_000);
 /// Part of the compression as read that a sensor misses, at most: one of the mean over a patch of
 /// parabolic depth reads two thirds.
 pub(super) const MISSED: Ratio = q16(500_000);
-/// Part by which the tread may give way otherwise than by its model, one sigma: of rubber from 4 to
-/// 16 mm thick that is told as 8.
-const GIVES_OTHERWISE: Ratio = q16(600_000);
 /// Rise of the centre that is noise, mm: three steps of the angle code.
 const NOISE: Millimetres = q16(120_000);
 /// Travel of the tread within which a slip of half of it shows beyond the noise, mm: 0.12 times the
@@ -54,8 +51,6 @@ struct Seen {
 pub struct CornerSlip {
     /// Axial travel by the tread since the edge was first seen, mm.
     rolled: Millimetres,
-    /// The most that the tread has given way by, mm.
-    gave: Millimetres,
     last: Option<Seen>,
     /// Least so far; while the wheel slips the largest.
     mark: Seen,
@@ -87,9 +82,7 @@ impl CornerSlip {
         let face = self.rolled + ahead;
         let slope = divide(over, ahead);
         let misread = divide(over * HEIGHT_MOST + reach * at.depth * MISSED, ahead);
-        self.gave = self.gave.max(at.gave);
-        let unsure = self.gave * GIVES_OTHERWISE;
-        let beyond = face - misread - self.rolled * CREEPS - unsure - unsure;
+        let beyond = face - misread - self.rolled * CREEPS;
         let now = Seen { travel: at.travel, face, beyond };
         let last = self.last.replace(now);
         if last.is_none_or(|last| face - last.face > MOST) {
@@ -166,7 +159,6 @@ mod tests {
             let over = (reach * reach - f64::powi(ahead, 2)).sqrt();
             let jitter = noise * f64::from(tick * 7919 % 101 - 50) / 50.0;
             let at_edge = OnEdge {
-                gave: Q16::ZERO,
                 travel: Travel::from_num(turned),
                 position: Q16::ZERO,
                 fall: Q16::from_num(R - over + error + jitter - missed * DEPTH),
@@ -230,7 +222,7 @@ mod tests {
                 let fall = Q16::from_num(R - (reach * reach - ahead * ahead).sqrt());
                 let (travel, position) = (Travel::ZERO, Q16::ZERO);
                 let depth = Q16::from_num(DEPTH);
-                let at = OnEdge { travel, position, fall, depth, gave: Q16::ZERO };
+                let at = OnEdge { travel, position, fall, depth };
                 watch.step(Q16::from_num(R), &at, false).to_num::<f64>()
             })
             .sum();
