@@ -4,11 +4,13 @@ use super::close::{Measured, slip_of};
 use super::crossing::{Contact, CrossingEvent, Lift, WatchInput};
 use super::landing::OnEdge;
 use super::odometry::Rolling;
+use super::slip::MISSED;
 use super::tread::Rolls;
 use super::wind_up::Pulled;
 use super::{EstimateState, Estimator, Expectation, Findings, LiftPoint, OpenCrossing, Position};
 use crate::fault::{Fault, Limit};
 use crate::model::LimitedBy;
+use crate::numeric::divide;
 use crate::sense::{FILTER_LAG, SensedState};
 use crate::units::{Direction, Millimetres, Newtons, Q16, Ratio, Tick};
 
@@ -150,7 +152,8 @@ impl Estimator {
             depth: seen.compression,
             ahead,
             floor,
-            lost: if drops { state.watch.eased } else { Q16::ZERO },
+            // A compression read low falls faster than the load.
+            lost: if drops { divide(state.watch.eased, Ratio::ONE + MISSED) } else { Q16::ZERO },
             level: far && self.watch.is_level(&state.watch, state.direction, &seen),
         }
     }

@@ -30,7 +30,8 @@ const GOES_ON: Ratio = q16(600_000);
 /// sensor of the mean makes of a creeping wheel on virtual rigs, without a derivation.
 const ROLLS: Ratio = q16(3_000_000);
 /// Motion of the face in a tick that is none of a slide, mm: 5 mm/s. A wheel that slides is out of balance,
-/// faster after 0.1 mm at 0.13 m/s2; a tread that relaxes beside a wheel that hardly turns is slower.
+/// faster after 0.1 mm at 0.13 m/s2; a tread that relaxes beside a slow wheel is slower. A slide shows if
+/// it goes 0.15 mm beyond it: one of 0.3 mm at 10 mm/s, of 1 mm at 6.
 const SINKS: Millimetres = q16(5_000);
 
 /// A wheel on the edge.
@@ -83,7 +84,7 @@ struct Face {
     travelled: Millimetres,
     /// Its position by the compression as read, mm.
     position: Millimetres,
-    /// What no wheel moves it on by that rolls as a slide leaves it at least: least where one begins, mm.
+    /// As read, less what [`MOVES`] or [`SINKS`] explain: least where a slide begins, mm.
     beyond: Millimetres,
 }
 
@@ -99,7 +100,9 @@ impl Face {
 pub struct Slide {
     travel: Option<Travel>,
     travelled: Millimetres,
-    /// By how much a wheel that rolls may have moved the face, beside a slide and at most, mm.
+    /// The same in a tick, smoothed.
+    turns: Millimetres,
+    /// By how much a wheel that rolls may have moved the face: by [`MOVES`] and by [`ROLLS`], mm.
     rolled: [Millimetres; 2],
     /// Largest compression, mm.
     deepest: Millimetres,
@@ -124,8 +127,10 @@ impl Slide {
         let turned = self.travel.map_or(Travel::ZERO, |travel| travel.saturating_sub(at.travel));
         let turned = Q16::narrow(turned) * divide(over, radius - at.depth).min(Ratio::ONE);
         self.travelled += turned;
+        // Over some ticks: a slow wheel's encoder counts in few of them.
+        self.turns += (turned - self.turns) * q16(125_000);
         for (rolled, travels) in self.rolled.iter_mut().zip([MOVES, ROLLS]) {
-            *rolled += (turned * travels).max(SINKS);
+            *rolled += (self.turns * travels).max(SINKS);
         }
         self.travel = Some(at.travel);
         let as_read = edge(at.depth) - self.travelled;
@@ -163,7 +168,7 @@ impl Slide {
         let less = (by_largest - as_read) * BY_LARGEST;
         let on = (as_read + less) * GOES_ON;
         let slid = as_read + less + on;
-        // More than a tread moves it by that rolls was fast, or is none.
+        // What is more than a tread moves it by that rolls must have been fast.
         let more = as_read - (end.travelled - begin.travelled) * ROLLS;
         let fast = more.min(SLID.half()) <= self.beyond;
         let shown = by_largest > SHOWN && slid >= self.beyond && fast;

@@ -11,7 +11,7 @@ use crate::fault::{Fault, Limit};
 use crate::model::LimitedBy;
 use crate::model::history::{History, HistoryWriter};
 use crate::numeric::LowPassState;
-use crate::sense::SensedState;
+use crate::sense::{SensedState, Zeros};
 use crate::units::{
     Direction, Millimetres, MillimetresPerSecond, Newtons, Q16, Ratio, Tick, Travel, q16,
 };
@@ -226,9 +226,9 @@ impl EstimateState {
         self.position = self.odometry.position(travel);
     }
 
-    /// The start has a record, and has not located the wheel yet.
-    pub const fn is_recorded(&self) -> bool {
-        matches!(self.known, Position::Recorded(_))
+    /// The start followed at once on a run whose zeros were taken, and has not located the wheel yet.
+    pub fn has_zeros(&self) -> bool {
+        matches!(self.known, Position::Recorded(at) if at.sure && at.zeros != Zeros::default())
     }
 
     /// Whether a start could go on from the position.

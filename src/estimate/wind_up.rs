@@ -4,7 +4,6 @@
 #![deny(clippy::float_arithmetic)]
 
 use super::odometry::Odometry;
-use super::slip::MISSED;
 use crate::model::wind_up::{CONTACT, Pull, Shear, Spread, Winding};
 use crate::numeric::{checked, divide, sqrt};
 use crate::rig::{Rig, RigError};
@@ -36,7 +35,7 @@ pub(super) struct Pulled {
     pub(super) ahead: Millimetres,
     /// Compression by the wall below the edge, mm.
     pub(super) floor: Millimetres,
-    /// Part of its load that the edge seems to have lost, to a wall that may lie higher than its table.
+    /// Part of its load that the edge has lost at least, to a wall that may lie higher than its table.
     pub(super) lost: Ratio,
     /// On a wall, far from any edge.
     pub(super) level: bool,
@@ -105,9 +104,7 @@ impl Pulls {
             state.carries = divide(pulled.pressed, to_load.max(LEAST * LEAST));
         }
         let pressed = pulled.pressed.max(Newtons::ONE);
-        // A compression read low falls faster than the load.
-        let least = divide(pulled.lost, Ratio::ONE + MISSED);
-        let floor = divide(to_load * state.carries, pressed).min(Ratio::ONE).max(least);
+        let floor = divide(to_load * state.carries, pressed).min(Ratio::ONE).max(pulled.lost);
         let (traction, normal) = self.traction(pulled, floor);
         let pull = Pull {
             traction,
@@ -140,7 +137,7 @@ impl Pulls {
         let ahead = pulled.ahead;
         let depth = pulled.depth.max(LEAST);
         let chord = sqrt(depth * (self.radius + self.radius - depth) + ahead * ahead) - ahead;
-        // A wall that lies higher than its table is met all the same.
+        // A wall that bears a part of the load is met, wherever its table has it.
         let sunk = pulled.floor.max(depth * floor);
         let wall = sqrt(sunk * (self.radius + self.radius));
         let all = if ahead > Q16::ZERO { chord + wall + wall * floor } else { chord + chord };

@@ -9,8 +9,8 @@ use crate::units::{Millimetres, MillimetresPerSecond, Newtons, q16};
 
 /// Ticks of rest that the self-test watches.
 pub const TEST_TICKS: u32 = 100;
-/// The same where the preload sensor is believed less than a tread, which takes time to be pressed:
-/// five times those in which the published one relaxes.
+/// The same where a preload sensor that is off by more than [`UNLOADED`] is believed less than a tread,
+/// which takes time to be pressed: five times those in which the published one relaxes.
 pub const SETTLED_TICKS: u32 = 500;
 /// Speed that still counts as rest, mm/s.
 const REST: MillimetresPerSecond = q16(500_000);

@@ -90,7 +90,7 @@ impl Controller {
         state.condition_ticks = if rests { state.condition_ticks + 1 } else { 0 };
         if state.condition_ticks >= TEST_TICKS {
             let pressed = self.estimator.means(tick.sensed.compression_filtered);
-            let (limit, known) = (self.senses.preload_zero_limit(), state.estimate.is_recorded());
+            let (limit, known) = (self.senses.preload_zero_limit(), state.estimate.has_zeros());
             let stowed = stowed(tick.sensed, pressed, limit, known);
             let off = stowed && tick.sensed.preload_filtered.abs() >= UNLOADED;
             if !off || state.condition_ticks >= SETTLED_TICKS {

@@ -166,6 +166,21 @@ fn a_reset_anywhere_is_followed_by_no_false_alarm() {
     }
 }
 
+/// A tread shows a preload late; a zero taken meanwhile would add to every one after it.
+#[test]
+fn a_reset_under_a_rising_preload_adds_nothing_to_it() {
+    for (seed, kept) in [(3014, true), (3226, true), (3014, false), (3226, false)] {
+        let mut session = session(seed, Direction::Deploy);
+        let over = |session: &Session, most_n| session.plant().truth().preload_n > most_n;
+        drive(&mut session, Direction::Deploy, LONGEST, |session| over(session, 5.0));
+        let restart = if kept { Session::restart } else { Session::reboot };
+        restart(&mut session);
+        drive(&mut session, Direction::Deploy, LONGEST, |session| over(session, 52.0));
+        let mode = session.mode();
+        assert!(matches!(mode, Mode::Complete(_)), "{seed}, {kept}: {mode:?}");
+    }
+}
+
 #[test]
 fn with_its_record_it_arrives_in_either_direction_from_anywhere() {
     each_direction(rigs() / 2, |seed, direction, then| {
