@@ -452,7 +452,7 @@ impl Estimator {
     /// cannot tell.
     fn clear_of(&self, state: &EstimateState, sensed: &SensedState) -> Option<bool> {
         let doubtful = state.known.is_unsure() || state.known.is_searching();
-        if doubtful && state.crossing.as_ref().is_none_or(|open| open.resumed) {
+        if state.crossing.as_ref().map_or(doubtful, |open| open.resumed) {
             return None;
         }
         let landed = |open: &OpenCrossing| open.landing.map(|landing| landing.face);
