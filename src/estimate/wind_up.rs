@@ -137,8 +137,9 @@ impl Pulls {
         let ahead = pulled.ahead;
         let depth = pulled.depth.max(LEAST);
         let chord = sqrt(depth * (self.radius + self.radius - depth) + ahead * ahead) - ahead;
-        // A wall that bears a part of the load is met, wherever its table has it.
-        let sunk = pulled.floor.max(depth * floor);
+        // What an edge has lost is on a wall, wherever its table has that.
+        let met = if pulled.lost > Q16::ZERO { depth * floor } else { Q16::ZERO };
+        let sunk = pulled.floor.max(met);
         let wall = sqrt(sunk * (self.radius + self.radius));
         let all = if ahead > Q16::ZERO { chord + wall + wall * floor } else { chord + chord };
         all * CONTACT
