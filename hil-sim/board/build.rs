@@ -1,4 +1,4 @@
-//! Makes constants of the vendor's description of the chip; `chip/description.rs` includes them.
+//! Makes constants of the vendor's description of the chip; `src/description.rs` includes them.
 
 use std::collections::BTreeMap;
 use std::path::Path;

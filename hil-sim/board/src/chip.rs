@@ -2,11 +2,12 @@
 //! them: clocks, interrupt lines, DMA requests, pins.
 
 mod bus;
-pub mod description;
+mod levels;
 pub mod map;
 mod pins;
 mod stray;
 
+use super::description::{DBGMCU, dbgmcu::*};
 use super::peripherals::Peripheral;
 use super::peripherals::adc::Adc;
 use super::peripherals::dma::{self, CHANNELS, Dma, Move};
@@ -25,11 +26,7 @@ use super::peripherals::system::{Counter, System};
 use super::peripherals::time_base::TimeBase;
 
 pub use pins::{Bridge, Motor, Pin};
-pub use stray::{Stray, Strays, Why};
-
-use description::{ADC1, ADC3, DBGMCU, EXTI, FLASH, GPIOA, GPIOG, PWR, SPI1, SYSCFG, TIM1, TIM8};
-use description::{adc1, dbgmcu::*, spi1};
-use map::Place;
+pub use stray::{Stray, Strays};
 
 /// External interrupt line of the voltage detector.
 const SUPPLY_LINE: u32 = 16;
@@ -287,25 +284,6 @@ impl Chip {
     pub(crate) fn settle(&mut self, now: u64) {
         self.settle_pins(now);
         self.settle_lines();
-    }
-
-    /// The same after an access to a register, for the lines that it can change.
-    fn settle_after(&mut self, Place { block, offset }: Place, write: bool, now: u64) {
-        // Reading a data register changes state.
-        let by_reading = (block.is(ADC1) || block.is(ADC3)) && offset % 0x100 == adc1::DR
-            || block.is(SPI1) && offset == spi1::DR;
-        let is_port = (GPIOA.address..=GPIOG.address).contains(&block.base);
-        let pins = [SYSCFG, TIM1, TIM8, EXTI, PWR, FLASH];
-        if write && (is_port || pins.into_iter().any(|of| block.is(of))) {
-            if is_port {
-                self.look_at_wheel();
-            }
-            self.settle(now);
-        } else if block.base == map::CORE && (0x100..0x500).contains(&offset) {
-            // The interrupt controller updates itself.
-        } else if write || by_reading {
-            self.settle_lines();
-        }
     }
 
     /// Updates interrupt lines and the next deadline.

@@ -9,6 +9,7 @@ pub mod chip;
 pub mod cli;
 pub mod core;
 pub mod cycles;
+pub mod description;
 pub mod elf;
 pub mod error;
 pub mod exceptions;

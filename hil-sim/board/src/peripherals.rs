@@ -7,8 +7,8 @@
 //!
 //! To add one: implement [`Peripheral`] in a file here (`read` and `write` by offset; `deadline` and
 //! `advance` if something happens by itself; registers that only keep what is written go into
-//! [`registers::Registers`], by the names of `chip/description.rs`). Add a field in `Chip`, a line in `chip/map.rs`; its interrupt line,
-//! deadline and DMA requests in `Chip::settle_lines`; its pins in `chip/pins.rs`. Test it against the
+//! [`registers::Registers`], by the names of [`crate::description`]). Add a field in `Chip`, a line in `chip/map.rs`; its interrupt line,
+//! deadline and DMA requests in `Chip::settle_lines`; its pins in `chip/pins.rs` and `chip/levels.rs`. Test it against the
 //! register description; in a run `unmodelled` must stay empty.
 
 pub mod adc;
@@ -27,7 +27,9 @@ pub mod syscfg;
 pub mod system;
 pub mod time_base;
 
-use crate::chip::Why;
+use serde::Serialize;
+
+use crate::rules::Rule;
 
 /// The core's clock, Hz.
 pub const HZ: u64 = 170_000_000;
@@ -56,6 +58,24 @@ impl Write {
     pub const fn ones(self) -> u32 {
         self.value & self.mask
     }
+}
+
+/// What is wrong with an access.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, thiserror::Error)]
+#[serde(rename_all = "snake_case")]
+pub enum Why {
+    /// No model implements the register, or this use of it.
+    #[error("not modelled")]
+    NoModel,
+    /// The peripheral's clock is off.
+    #[error("clock off")]
+    NoClock,
+    /// These bits, written as 1, are reserved.
+    #[error("reserved bits {0:#x}")]
+    Reserved(u32),
+    /// The access broke a rule of the chip.
+    #[error("{0}")]
+    Broken(Rule),
 }
 
 /// A block of registers.

@@ -8,7 +8,7 @@ use interstage::restart::{DriveSnapshot, Reset, Restart, Stopped};
 use interstage::supervise::Mode;
 use rig_board::bench::STEP;
 use rig_board::chip::Pin;
-use rig_board::chip::description::rcc;
+use rig_board::description::rcc;
 use rig_board::peripherals::flash::Cut;
 use rig_board::peripherals::pwr::{HOLDS, Then};
 use rig_board::peripherals::rcc::Cause;

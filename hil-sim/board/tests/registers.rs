@@ -7,8 +7,8 @@ use std::collections::BTreeSet;
 use std::process::Command;
 
 use rig_board::chip::Chip;
-use rig_board::chip::description::{self, Field, FieldAccess};
 use rig_board::core::{Access, Bus};
+use rig_board::description::{self, Field, FieldAccess};
 
 use exceptions::EXCEPTIONS;
 

@@ -6,11 +6,11 @@
 mod adc;
 mod sources;
 
-use rig_board::chip::description;
-use rig_board::chip::{Chip, Why};
+use rig_board::chip::Chip;
 use rig_board::core::{Access, Bus};
-use rig_board::peripherals::HZ;
+use rig_board::description;
 use rig_board::peripherals::pwr::Then;
+use rig_board::peripherals::{HZ, Why};
 use rig_board::rules::Rule;
 
 /// Cycles in a microsecond.

@@ -5,7 +5,7 @@ use super::panels::{Across, View, figure};
 use super::scene::Scene;
 use super::svg::escape;
 use super::verdict::{Grade, gap_sentence, headline, origin, slip_sentence, verdict};
-use super::{animation, crossings, tables};
+use super::{animation, band, crossings, tables};
 use crate::record::Recording;
 use crate::table::counted;
 
@@ -182,7 +182,8 @@ fn plots(recording: &Recording) -> String {
 fn stack(recording: &Recording, across: Across) -> String {
     let view = View::new(recording, across);
     let mut html = String::new();
-    for panel in view.all().into_iter().filter(Panel::has_data) {
+    let panels = view.all().into_iter().chain([band::panel(&view)]);
+    for panel in panels.filter(Panel::has_data) {
         let name = format!("{}, {}", panel.title, across.name());
         html += &figure(&panel, across, SIZE, &name);
     }

@@ -163,7 +163,7 @@ impl<'a> View<'a> {
         }
     }
 
-    /// Every plot of the run, in the order of the page.
+    /// Every plot of the run but the bands, in the order of the page.
     pub(super) fn all(&self) -> Vec<Panel> {
         vec![
             self.speed(),
@@ -173,7 +173,6 @@ impl<'a> View<'a> {
             self.slip_margin(),
             self.compression(),
             self.duty(),
-            super::band::panel(self),
         ]
     }
 

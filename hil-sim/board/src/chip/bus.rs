@@ -1,12 +1,11 @@
 //! Accesses of the core and of DMA to the chip's registers, with the rules between blocks.
 
 use super::Chip;
-use super::description::{self, RCC, TIM2, rcc, tim2};
 use super::map::{self, Place};
-use super::stray::Why;
 use crate::core::{Access, Bus};
+use crate::description::{self, *};
 use crate::exceptions::number::NMI;
-use crate::peripherals::Write;
+use crate::peripherals::{Why, Write};
 
 impl Chip {
     /// The register of an access, if a model with a clock answers it. Other accesses are noted.
@@ -21,6 +20,25 @@ impl Chip {
             return None;
         }
         Some(place)
+    }
+
+    /// Updates what an access to a register can change.
+    fn settle_after(&mut self, Place { block, offset }: Place, write: bool, now: u64) {
+        // Reading a data register changes state.
+        let by_reading = (block.is(ADC1) || block.is(ADC3)) && offset % 0x100 == adc1::DR
+            || block.is(SPI1) && offset == spi1::DR;
+        let is_port = (GPIOA.address..=GPIOG.address).contains(&block.base);
+        let pins = [SYSCFG, TIM1, TIM8, EXTI, PWR, FLASH];
+        if write && (is_port || pins.into_iter().any(|of| block.is(of))) {
+            if is_port {
+                self.look_at_wheel();
+            }
+            self.settle(now);
+        } else if block.base == map::CORE && (0x100..0x500).contains(&offset) {
+            // The interrupt controller updates itself.
+        } else if write || by_reading {
+            self.settle_lines();
+        }
     }
 }
 

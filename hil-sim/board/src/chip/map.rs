@@ -1,8 +1,8 @@
 //! Address map, and the clock of each block.
 
 use super::Chip;
-use super::description::rcc::{ahb1enr, ahb2enr, apb1enr1, apb2enr};
-use super::description::*;
+use crate::description::rcc::{ahb1enr, ahb2enr, apb1enr1, apb2enr};
+use crate::description::*;
 use crate::peripherals;
 use crate::peripherals::rcc::Rcc;
 use interstage::params::slots::SLOT_BYTES;

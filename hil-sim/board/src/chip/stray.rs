@@ -5,27 +5,9 @@ use std::fmt;
 
 use serde::Serialize;
 
-use super::description;
 use crate::core::Access;
-use crate::rules::Rule;
-
-/// What is wrong with an access.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, thiserror::Error)]
-#[serde(rename_all = "snake_case")]
-pub enum Why {
-    /// No model implements the register, or this use of it.
-    #[error("not modelled")]
-    NoModel,
-    /// The peripheral's clock is off.
-    #[error("clock off")]
-    NoClock,
-    /// These bits, written as 1, are reserved.
-    #[error("reserved bits {0:#x}")]
-    Reserved(u32),
-    /// The access broke a rule of the chip.
-    #[error("{0}")]
-    Broken(Rule),
-}
+use crate::description;
+use crate::peripherals::Why;
 
 /// Accesses of one kind to one register.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -95,7 +77,8 @@ impl Strays {
         self.0.values()
     }
 
-    /// Those for which there is a reason: [`Rule::is_accepted`], and the time driver's flags.
+    /// Those for which there is a reason: [`crate::rules::Rule::is_accepted`], and the time
+    /// driver's flags.
     pub fn accepted(&self) -> impl Iterator<Item = &Stray> {
         self.1.values()
     }

@@ -11,10 +11,9 @@
 
 mod converter;
 
-use super::{Peripheral, Write};
-use crate::chip::Why;
-use crate::chip::description::adc1::{CR, ISR};
-use crate::chip::description::adc12_common::{self, ccr};
+use super::{Peripheral, Why, Write};
+use crate::description::adc1::{CR, ISR};
+use crate::description::adc12_common::{self, ccr};
 use crate::rules::Rule;
 
 use converter::Converter;

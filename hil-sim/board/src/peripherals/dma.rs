@@ -6,10 +6,9 @@
 //! Source: RM0440, chapters of DMA and DMAMUX.
 
 use super::registers::Registers;
-use super::{Peripheral, Write};
-use crate::chip::Why;
-use crate::chip::description::dma1::*;
-use crate::chip::description::{DMAMUX, Field, bits, dmamux};
+use super::{Peripheral, Why, Write};
+use crate::description::dma1::*;
+use crate::description::{DMAMUX, Field, bits, dmamux};
 use crate::rules::Rule;
 
 pub const CHANNELS: usize = 8;

@@ -1,9 +1,8 @@
 //! A quadrature counter: TIM5.
 
 use super::registers::Registers;
-use super::{Peripheral, Write};
-use crate::chip::Why;
-use crate::chip::description::{Field, TIM5, bits, tim2::*};
+use super::{Peripheral, Why, Write};
+use crate::description::{Field, TIM5, bits, tim2::*};
 
 /// Registers that the model has in part: two inputs with their filters, and quadrature modes.
 const PARTS: [(u32, u32); 4] = [

@@ -2,9 +2,8 @@
 //! supply's detector.
 
 use super::registers::Registers;
-use super::{Peripheral, Write};
-use crate::chip::Why;
-use crate::chip::description::{EXTI, exti::*};
+use super::{Peripheral, Why, Write};
+use crate::description::{EXTI, exti::*};
 
 /// External interrupts. Nothing here drives the lines of the second bank.
 #[derive(Clone, Debug)]

@@ -18,9 +18,8 @@ mod power;
 mod tests;
 
 use super::registers::Registers;
-use super::{HZ, Peripheral, Write};
-use crate::chip::Why;
-use crate::chip::description::{FLASH, bits, flash::*};
+use super::{HZ, Peripheral, Why, Write};
+use crate::description::{FLASH, bits, flash::*};
 
 use ecc::Ecc;
 pub use ecc::Wrong;

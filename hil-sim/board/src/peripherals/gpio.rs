@@ -3,10 +3,9 @@
 //! Source: RM0440, 9.3 (functions) and 9.4 (registers).
 
 use super::registers::Registers;
-use super::{Peripheral, Write};
-use crate::chip::Why;
-use crate::chip::description;
-use crate::chip::description::{GPIOA, GPIOB, GPIOC, GPIOD, GPIOE, GPIOF, GPIOG, gpioc::*};
+use super::{Peripheral, Why, Write};
+use crate::description;
+use crate::description::{GPIOA, GPIOB, GPIOC, GPIOD, GPIOE, GPIOF, GPIOG, gpioc::*};
 
 /// The ports: those with pins of the debug probe have values of their own after reset.
 const PORTS: [description::Peripheral; 7] = [GPIOA, GPIOB, GPIOC, GPIOD, GPIOE, GPIOF, GPIOG];

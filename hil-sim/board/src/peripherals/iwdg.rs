@@ -1,9 +1,8 @@
 //! The independent watchdog, on its own oscillator of 32 kHz.
 
 use super::registers::Registers;
-use super::{HZ, Peripheral, Write};
-use crate::chip::Why;
-use crate::chip::description::{IWDG, bits, iwdg::*};
+use super::{HZ, Peripheral, Why, Write};
+use crate::description::{IWDG, bits, iwdg::*};
 
 /// Nominal frequency of its oscillator, Hz.
 pub const LSI_HZ: u64 = 32_000;

@@ -5,9 +5,8 @@
 
 use super::encoder::filter_cycles;
 use super::registers::Registers;
-use super::{Peripheral, Write};
-use crate::chip::Why;
-use crate::chip::description::{TIM1, bits, tim1::*};
+use super::{Peripheral, Why, Write};
+use crate::description::{TIM1, bits, tim1::*};
 
 /// Registers that the model has in part: counting up and edge-aligned, compares without dithering,
 /// a break input from the pin alone, no lock.

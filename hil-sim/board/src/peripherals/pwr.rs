@@ -7,9 +7,8 @@
 //! Source: RM0440, 6.2.2 (programmable voltage detector) and 6.4 (registers).
 
 use super::registers::Registers;
-use super::{HZ, Peripheral, Write};
-use crate::chip::Why;
-use crate::chip::description::{PWR, pwr::*};
+use super::{HZ, Peripheral, Why, Write};
+use crate::description::{PWR, pwr::*};
 
 /// Least core cycles for which the board's capacitors supply the chip between the detector's
 /// threshold and the reset: a requirement of the wiring.

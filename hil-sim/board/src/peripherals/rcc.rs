@@ -8,9 +8,8 @@
 //! characteristics.
 
 use super::registers::Registers;
-use super::{HZ, Peripheral, Write};
-use crate::chip::Why;
-use crate::chip::description::{Field, RCC, bits, rcc::*};
+use super::{HZ, Peripheral, Why, Write};
+use crate::description::{Field, RCC, bits, rcc::*};
 use crate::rules::Rule;
 
 /// What starts a source of clock, what reports it ready, longest time that it takes, us; of HSE (a

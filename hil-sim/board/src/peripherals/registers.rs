@@ -1,8 +1,7 @@
 //! Registers that keep what is written to them.
 
-use super::Write;
-use crate::chip::Why;
-use crate::chip::description::{Field, Peripheral};
+use super::{Why, Write};
+use crate::description::{Field, Peripheral};
 
 /// The value and the writable bits of each register, by word of the block.
 #[derive(Clone, Debug, Default)]
@@ -106,7 +105,7 @@ impl super::Peripheral for Registers {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::chip::description::{TIM1, bits, tim1::*};
+    use crate::description::{TIM1, bits, tim1::*};
 
     #[test]
     fn a_write_of_bits_that_are_not_kept_is_refused_and_other_registers_are_absent() {

@@ -1,9 +1,8 @@
 //! SPI1 as master with frames of up to 16 bits, and the angle sensor at its other end.
 
 use super::registers::Registers;
-use super::{Peripheral, Write};
-use crate::chip::Why;
-use crate::chip::description::{SPI1, bits, spi1::*};
+use super::{Peripheral, Why, Write};
+use crate::description::{SPI1, bits, spi1::*};
 
 mod angle;
 

@@ -2,9 +2,8 @@
 //! stops the motor timers.
 
 use super::registers::Registers;
-use super::{Peripheral, Write};
-use crate::chip::Why;
-use crate::chip::description::{SYSCFG, bits, syscfg::*};
+use super::{Peripheral, Why, Write};
+use crate::description::{SYSCFG, bits, syscfg::*};
 
 /// System configuration.
 #[derive(Clone, Debug)]

@@ -7,8 +7,7 @@ mod control;
 mod mpu;
 mod tick;
 
-use super::{Peripheral, Write};
-use crate::chip::Why;
+use super::{Peripheral, Why, Write};
 use crate::exceptions::Exceptions;
 use crate::exceptions::number::{INTERRUPT, SYS_TICK};
 

@@ -4,9 +4,8 @@
 //! register or overflows. The registers of TIM2 are 32 bits wide, of TIM7 16.
 
 use super::registers::Registers;
-use super::{Peripheral, Write};
-use crate::chip::Why;
-use crate::chip::description::{TIM2, TIM7, bits, tim2::*};
+use super::{Peripheral, Why, Write};
+use crate::description::{TIM2, TIM7, bits, tim2::*};
 
 /// Directions, one-pulse mode, alternate clocks: none of them modelled.
 const PLAIN: u32 = bits(&[cr1::CEN, cr1::UDIS, cr1::URS, cr1::ARPE]);

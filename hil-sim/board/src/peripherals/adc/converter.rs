@@ -1,9 +1,8 @@
 //! One converter: its registers, and its conversions in their times.
 
-use crate::chip::Why;
-use crate::chip::description::{ADC1, Field, adc1::*, bits};
+use crate::description::{ADC1, Field, adc1::*, bits};
 use crate::peripherals::registers::Registers;
-use crate::peripherals::{HZ, Write};
+use crate::peripherals::{HZ, Why, Write};
 use crate::rules::Rule;
 
 /// Converter clocks that a calibration takes, from its end to the enabling, and from the enabling

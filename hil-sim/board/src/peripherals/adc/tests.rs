@@ -1,5 +1,5 @@
 use super::*;
-use crate::chip::description::{adc1::*, bits};
+use crate::description::{adc1::*, bits};
 use crate::peripherals::tests::write;
 
 /// The regulator, as each command keeps it.

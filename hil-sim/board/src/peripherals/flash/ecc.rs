@@ -9,7 +9,7 @@
 use std::collections::BTreeMap;
 
 use super::{BANK_BYTES, BASE, Change, Flash, Write};
-use crate::chip::description::{Field, bits, flash::eccr};
+use crate::description::{Field, bits, flash::eccr};
 
 /// Bytes that are corrected together.
 const WORD: u32 = 8;

@@ -1,7 +1,7 @@
 //! The rules of the reference manual, one a test.
 
 use super::*;
-use crate::chip::description::Field;
+use crate::description::Field;
 use crate::peripherals::rcc::Cause;
 use crate::peripherals::tests::write;
 

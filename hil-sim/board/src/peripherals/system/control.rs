@@ -1,7 +1,6 @@
 //! The system control block: vectors, faults and their status, reset by software.
 
-use super::Write;
-use crate::chip::Why;
+use super::{Why, Write};
 use crate::core::Fault;
 use crate::exceptions::Exceptions;
 use crate::exceptions::number::{

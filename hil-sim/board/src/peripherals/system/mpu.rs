@@ -3,8 +3,7 @@
 //!
 //! Source: ARMv7-M Architecture Reference Manual, B3.5.
 
-use super::super::Write;
-use crate::chip::Why;
+use super::super::{Why, Write};
 
 const TYPE: u32 = 0xD90;
 const CTRL: u32 = 0xD94;

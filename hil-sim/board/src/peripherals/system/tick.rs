@@ -1,7 +1,6 @@
 //! The core's two counters: the system timer, and the cycle counter of the data watchpoint unit.
 
-use super::super::{Peripheral, Write};
-use crate::chip::Why;
+use super::super::{Peripheral, Why, Write};
 
 const CSR: u32 = 0x10;
 const RVR: u32 = 0x14;
