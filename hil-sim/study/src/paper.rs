@@ -14,6 +14,7 @@ pub mod claims;
 pub mod experiment;
 mod finite_elements;
 pub mod histories;
+pub mod history;
 pub mod hold;
 pub mod means;
 pub mod measure;
@@ -32,7 +33,6 @@ use serde::Serialize;
 use crate::figure::{Claim, Figure};
 use amplitudes::Amplitudes;
 use case::Case;
-use claims::Data;
 use experiment::Experiment;
 use histories::Histories;
 use hold::Hold;
@@ -80,35 +80,32 @@ pub fn regenerate(done: &(dyn Fn() + Sync)) -> Result<Study> {
     };
     let deployments = [cases::cases(), transitions::cases()].concat();
     let deployments = find(&deployments).into_par_iter().map(Histories::new);
-    let data = Data {
-        histories: deployments.collect::<Result<_>>()?,
-        amplitudes: Amplitudes::new(&find(&cases::cases()))?,
-        modes: Modes::new()?,
-        preload: Sweep::new(Variable::Preload, &find(&Variable::Preload.cases()))?,
-        speed: Sweep::new(Variable::Speed, &find(&Variable::Speed.cases()))?,
-        hold: Hold::new(&find(&Hold::cases()))?,
-        experiments,
-    };
-    let (at_study, at_rig) = data.histories.split_at(cases::cases().len());
+    let histories = deployments.collect::<Result<Vec<_>>>()?;
+    let (at_study, at_rig) = histories.split_at(cases::cases().len());
+    let amplitudes = Amplitudes::new(&find(&cases::cases()))?;
+    let modes = Modes::new()?;
+    let preload = Sweep::new(Variable::Preload, &find(&Variable::Preload.cases()))?;
+    let speed = Sweep::new(Variable::Speed, &find(&Variable::Speed.cases()))?;
+    let hold = Hold::new(&find(&Hold::cases()))?;
     let figures = vec![
         cases::figure(at_study),
-        data.amplitudes.loads_figure(),
-        data.amplitudes.gap_figure(at_study),
-        data.modes.figure(),
-        data.preload.gap_figure(),
-        data.speed.gap_figure(),
-        data.preload.depth_figure(),
-        data.speed.depth_figure(),
+        amplitudes.loads_figure(),
+        amplitudes.gap_figure(at_study),
+        modes.figure(),
+        preload.gap_figure(),
+        speed.gap_figure(),
+        preload.depth_figure(),
+        speed.depth_figure(),
         transitions::figure(at_rig),
-        data.hold.figure(),
+        hold.figure(),
     ];
     let claims = [
-        cases::claims(&data),
-        amplitudes::claims(&data),
-        modes::claims(&data.modes),
-        sweeps::claims(&data),
-        transitions::claims(&data),
-        hold::claims(&data),
+        cases::claims(at_study),
+        amplitudes::claims(&amplitudes, at_study),
+        modes::claims(&modes),
+        sweeps::claims(&preload, &speed, &experiments),
+        transitions::claims(at_rig),
+        hold::claims(&hold, &experiments, &speed.gap),
     ];
     let claims = claims.concat();
     Ok(Study { figures, claims })

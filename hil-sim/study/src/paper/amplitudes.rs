@@ -6,11 +6,12 @@ use anyhow::Result;
 use super::case::Case;
 use super::cases::cases;
 use super::claims::{
-    BySource, Column, Data, FALLS, RISES, change, largest, percents, row, table, within,
+    BySource, FALLS, RISES, all_go, change, largest, percents, row, spans, table, within,
 };
 use super::experiment::{Experiment, Run, marks as mark_runs};
 use super::finite_elements::{self, Crossing};
-use super::histories::{Histories, Instant, Quantity, stage_ends_mm};
+use super::histories::{Histories, stage_ends_mm};
+use super::history::{Instant, Quantity};
 use super::published::{AMPLITUDE_MM, CASES, COLLISION_N, STRESS};
 use super::simulation;
 use super::theory::{self, Drive, Lift};
@@ -168,26 +169,25 @@ impl Amplitudes {
 
 /// The claims of both.
 #[rustfmt::skip]
-pub fn claims(data: &Data) -> Vec<Claim> {
+pub fn claims(amplitudes: &Amplitudes, all: &[Histories]) -> Vec<Claim> {
     let [slow, pressed, fast, _] = cases();
-    let three = [slow, pressed, fast];
     let goes = |pick: fn(&Lift) -> f64, to, sense, (decimals, unit)| {
-        let text = data.span(Column::Lift(pick), [slow, to], decimals, unit);
-        let found = format!("{text} (theory, simulation, virtual rig).");
-        (data.goes(Column::Lift(pick), [slow, to], sense), found)
+        let ends = [slow, to].map(|case| amplitudes.lift(case, pick));
+        let text = spans(ends, decimals, unit);
+        (all_go(ends, sense), format!("{text} (theory, simulation, virtual rig)."))
     };
     let [force, depth, stress, gap]: [fn(&Lift) -> f64; 4] =
         [|l| l.collision_n, |l| l.depth_mm, |l| l.impact_kpa, |l| l.gap_mm];
-    let simulated = |pick| three.map(|case| data.get(Column::Lift(pick), case)[1]);
+    let simulated = |pick| amplitudes.values(Source::Simulation, pick);
     let force_off = change(COLLISION_N, simulated(force));
     let gap_off = change(AMPLITUDE_MM, simulated(gap));
-    let theoretical = three.map(|case| data.get(Column::Lift(gap), case)[0]);
-    let alike = change(theoretical, simulated(gap));
-    let area = data.change(Column::Lift(|l| l.area_mm2), [slow, pressed]);
-    let apart = largest(data.histories(three).map(resemblance));
-    let arm_over_gap = largest(three.map(|case| {
-        let [_, _, arm_um] = data.get(Column::Peak(Quantity::Vibration, 0), case);
-        arm_um * 1e-3 / data.get(Column::Lift(gap), case)[2]
+    let alike = change(amplitudes.values(Source::Theory, gap), simulated(gap));
+    let [area, more_area] = [slow, pressed].map(|case| amplitudes.lift(case, |l| l.area_mm2));
+    let area = change(area, more_area);
+    let apart = largest(all[..3].iter().map(resemblance));
+    let arm_over_gap = largest(all[..3].iter().map(|one| {
+        let [_, _, arm_um] = one.peak(Quantity::Vibration, 0);
+        arm_um * 1e-3 / amplitudes.lift(one.case, gap)[2]
     }));
     let loads = table("fig13-14", SIMULATED, [
         row("fe-collision-falls-with-preload", goes(force, pressed, FALLS, (1, "N")),

@@ -2,10 +2,9 @@
 //! loads.
 
 use super::case::{Case, Loads};
-use super::claims::Column::Peak;
-use super::claims::{Data, FALLS, RISES, largest, percents, row, table, within};
-use super::histories::Quantity::{Collision, Impact, Vibration};
+use super::claims::{FALLS, RISES, all_go, change, largest, percents, row, table, within};
 use super::histories::{Histories, panels};
+use super::history::Quantity::{Collision, Impact, Vibration};
 use super::published::{CASES, COLLISION_N};
 use super::transitions::count_humps;
 use crate::figure::{Claim, Figure, Series, Source};
@@ -41,15 +40,15 @@ pub fn figure(all: &[Histories]) -> Figure {
 
 /// The claims about it.
 #[rustfmt::skip]
-pub fn claims(data: &Data) -> Vec<Claim> {
-    let all = data.histories(cases());
-    let [slow, pressed, fast, slowest] = cases();
-    let first = |quantity, [from, to]: [Case; 2], sense| {
-        let peaks = [from, to].map(|case| data.peaks_text(quantity, case)).join("; ");
+pub fn claims(all: &[Histories]) -> Vec<Claim> {
+    let all @ [slow, pressed, fast, slowest]: [&Histories; 4] = std::array::from_fn(|i| &all[i]);
+    let first = |quantity, ends: [&Histories; 2], sense| {
+        let peaks = ends.map(|one| one.peaks_text(quantity)).join("; ");
         let found = format!("{peaks} (theory; simulation; virtual rig, by stage).");
-        (data.goes(Peak(quantity, 0), [from, to], sense), found)
+        (all_go(ends.map(|one| one.peak(quantity, 0)), sense), found)
     };
-    let more = |stage| data.change(Peak(Collision, stage), [slow, pressed]);
+    let second = [slow, pressed].map(|one| one.peak(Collision, 1));
+    let more = |stage| change(slow.peak(Collision, stage), pressed.peak(Collision, stage));
     let more_found = |stage| {
         let parts = percents(more(stage), 1, ", ");
         format!("{parts} from 100 to 120 N at 5 mm/s (theory, simulation, virtual rig).")
@@ -60,9 +59,8 @@ pub fn claims(data: &Data) -> Vec<Claim> {
     });
     let humps = humps.into_iter().fold(0, usize::max);
     let left = largest(all.into_iter().flat_map(|one| one.left_over(Impact)));
-    let less = cases()
-        .map(|case| data.get(Peak(Collision, 0), case).map(|force| force - case.preload_n));
-    let impact = cases().map(|case| data.get(Peak(Impact, 0), case));
+    let less = all.map(|one| one.peak(Collision, 0).map(|force| force - one.case.preload_n));
+    let impact = all.map(|one| one.peak(Impact, 0));
     // Whether two cases are in the same order by both, in every source.
     let alike = |a: usize, b: usize| {
         (0..3).all(|of| (less[a][of] < less[b][of]) == (impact[a][of] < impact[b][of]))
@@ -87,7 +85,7 @@ pub fn claims(data: &Data) -> Vec<Claim> {
         row("collision-grows-with-speed-120", first(Collision, [slowest, pressed], RISES),
             "At 120 N, too, the collision grows with the speed (5 mm/s against 3 mm/s).", ""),
         row("second-collision-grows-with-preload",
-            (data.goes(Peak(Collision, 1), [slow, pressed], RISES), more_found(1)),
+            (all_go(second, RISES), more_found(1)),
             "In the second transition more preload makes for a larger force.", ""),
         row("third-collision-equal", (within(more(2), NEARLY), more_found(2)),
             "In the third transition 20 N more preload make no difference: the peaks are nearly \

@@ -14,10 +14,9 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 use super::case::{Arms, Case};
-use super::histories::{History, Instant};
-use super::measure::{collision_n, impact_kpa, resistance};
+use super::history::{History, Instant};
+use super::measure::{area_of_depth_mm2, collision_n, impact_kpa, resistance};
 use super::published::{LOG_S, RUNS, RUNS_OF_A_MEAN};
-use super::theory::area_of_depth_mm2;
 use crate::figure::Series;
 use crate::reference::beam::BeamError;
 use crate::reference::vibration::Modal;

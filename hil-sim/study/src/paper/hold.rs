@@ -5,11 +5,12 @@ use anyhow::Result;
 use interstage::rig::Rig;
 
 use super::case::{Case, Loads};
-use super::claims::{BySource, Column, Data, largest, percents, row, table, within};
+use super::claims::{BySource, change, largest, percents, row, table, within};
 use super::experiment::{Experiment, Reading, Run, marks};
-use super::histories::Points;
+use super::history::Points;
 use super::published::{CONSTRAINED_HZ, FREE_HZ, LEAST_PRELOAD_N, LEAST_SPEED_MM_S, RIG_PRELOAD_N};
 use super::simulation;
+use super::sweeps::Curves;
 use super::theory::{self, Drive};
 use crate::figure::{Chart, Claim, Figure, Series, Source};
 use crate::reference::beam::BeamError;
@@ -135,22 +136,21 @@ impl Hold {
     }
 }
 
-/// The claims.
+/// The claims, with what all experiments and the gap over the speed say about them.
 #[rustfmt::skip]
-pub fn claims(data: &Data) -> Vec<Claim> {
-    let Hold { preload, least_preload_n, friction_alone, response_um, .. } = &data.hold;
+pub fn claims(hold: &Hold, experiments: &[Experiment], gap: &Curves) -> Vec<Claim> {
+    let Hold { preload, least_preload_n, friction_alone, response_um, .. } = hold;
     let (resonant, at_fastest) = response_um;
     let [safe, faster, held] = Hold::cases();
-    let apart = |case| data.change(Column::HeldGap, [safe, case]);
+    let apart = |case| change(hold.gap(safe), hold.gap(case));
     let rig = Rig::prototype();
-    let at_rig = data.experiments.iter().filter(|e| e.case.loads == Loads::Prototype);
+    let at_rig = experiments.iter().filter(|e| e.case.loads == Loads::Prototype);
     let runs: Vec<&Run> = at_rig.flat_map(|e| &e.runs).collect();
     let readings: Vec<&Reading> = runs.iter().flat_map(|run| &run.crossings).collect();
     let separation = largest(runs.iter().map(|run| run.separation_mm));
     let gaps = || readings.iter().map(|r| r.true_gap_mm);
     let swings: f64 = readings.iter().map(|r| r.preload_swing_n).sum();
     let swing = swings / readings.len().max(1) as f64;
-    let gap = &data.speed.gap;
     let times = |values: &[f64]| values[values.len() - 1] / values[0];
     let (speed_times, gap_times) = (times(&gap.experiment.at), times(&gap.simulation));
     let least_hz = LEAST_SPEED_MM_S / rig.drive.ripple_pitch_mm;

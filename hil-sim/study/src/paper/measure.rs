@@ -1,4 +1,4 @@
-//! Collision force and impact stress from the state of the virtual rig.
+//! Collision force and impact stress from the state of the virtual rig, and contact areas.
 //!
 //! The collision force is the axial force of the contact against the motion beyond rolling
 //! resistance. The plant does not keep it, but it follows from what it keeps: a gripping
@@ -6,6 +6,7 @@
 //! utilisation u, the pressing force N and the thrust T; from S goes what the continuous
 //! wall resists.
 
+use super::case::Case;
 use hil_sim::plant::rig::VirtualRig;
 use hil_sim::plant::rolling;
 use hil_sim::plant::wall::LocalWall;
@@ -83,14 +84,24 @@ pub fn corner_area_mm2((radius, width): (f64, f64), ahead_mm: f64, above_mm: f64
     radius * width * (half - start).max(0.0)
 }
 
+/// Contact area that belongs to a tread depth at lift-off, mm^2, by the nominal
+/// geometry: how a compression sensor's reading becomes an area.
+pub fn area_of_depth_mm2(case: &Case, depth_mm: f64) -> f64 {
+    let wheel = case.loads.rig().rig;
+    let above = wheel.wheel_radius_mm - wheel.step_height_mm;
+    let reach = wheel.wheel_radius_mm - depth_mm;
+    let ahead = (reach * reach - above * above).max(0.0).sqrt();
+    corner_area_mm2((wheel.wheel_radius_mm, wheel.wheel_width_mm), ahead, above)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::figure::Source;
-    use crate::paper::case::{Case, Loads};
+    use crate::paper::case::Loads;
     use crate::paper::experiment;
     use crate::paper::histories::Histories;
-    use crate::paper::histories::Quantity;
+    use crate::paper::history::Quantity;
 
     #[test]
     fn the_area_is_that_of_a_fine_sum() {
@@ -111,6 +122,17 @@ mod tests {
         }
         assert_eq!(corner_area_mm2((radius, width), 14.0, above), 0.0);
         assert_eq!(stress_kpa(5.0, 0.0), 0.0);
+    }
+
+    #[test]
+    fn a_depth_gives_the_area_that_the_corner_cuts_off() {
+        let case = Case::new(Loads::Prototype, 5.0, 33.3);
+        for ahead_mm in [0.5, 8.0, 12.5] {
+            let depth_mm = 25.0 - 21.0_f64.hypot(ahead_mm);
+            let exact = corner_area_mm2((25.0, 28.0), ahead_mm, 21.0);
+            let area = area_of_depth_mm2(&case, depth_mm);
+            assert!((area / exact - 1.0).abs() < 1e-9, "{area} {exact}");
+        }
     }
 
     #[test]

@@ -4,7 +4,7 @@
 use anyhow::Result;
 
 use super::case::{Arms, Case};
-use super::histories::{History, INTERVAL_S, Instant};
+use super::history::{History, INTERVAL_S, Instant};
 use super::measure::{corner_area_mm2, stress_kpa};
 use super::theory::{Drive, Lift, setup};
 use crate::reference::collision::dynamic;

@@ -5,7 +5,7 @@ use anyhow::Result;
 use rayon::prelude::*;
 
 use super::case::{Case, Loads};
-use super::claims::{Data, FALLS, RISES, goes, largest, percents, row, span, table};
+use super::claims::{FALLS, RISES, goes, largest, percents, row, span, table};
 use super::experiment::{Experiment, Reading};
 use super::means::{Means, bend};
 use super::published::{AREA_SPREAD_MM2, DEPTH_SPREAD_MM, GAP_SPREAD_MM};
@@ -302,12 +302,11 @@ fn spreads_agree(id: &'static str, sweep: &Sweep) -> Claim {
 
 /// The claims about both sweeps: figures 20 and 22, then 21 and 23.
 #[rustfmt::skip]
-pub fn claims(data: &Data) -> Vec<Claim> {
-    let Sweep { gap, true_gap, depth, area, .. } = &data.preload;
+pub fn claims(preload: &Sweep, speed: &Sweep, experiments: &[Experiment]) -> Vec<Claim> {
+    let Sweep { gap, true_gap, depth, area, .. } = preload;
     let middle = gap.experiment.middle();
     let fall = middle[0] - middle[GRID - 1];
-    let [by_preload, by_speed] =
-        [&data.preload, &data.speed].map(|sweep| sweep.gap.experiment.spread());
+    let [by_preload, by_speed] = [preload, speed].map(|sweep| sweep.gap.experiment.spread());
     let off = |(measured, is): (&f64, f64)| (measured - is).abs();
     let measured_off = largest(middle.iter().zip(true_gap.middle()).map(off));
     let gaps_by_preload = table("fig20", SECTION, [
@@ -331,10 +330,10 @@ pub fn claims(data: &Data) -> Vec<Claim> {
             "As the embedding depth grows with the preload, so does the contact area.", ""),
         depth.spread("depth-spread-preload", "means", 3),
         area.spread("area-spread-preload", "means", 2),
-        spreads_agree("depth-and-area-spreads-agree-preload", &data.preload),
+        spreads_agree("depth-and-area-spreads-agree-preload", preload),
     ]);
-    let Sweep { gap, depth, area, .. } = &data.speed;
-    let over_speed = data.experiments.iter().filter(|e| Variable::Speed.cases().contains(&e.case));
+    let Sweep { gap, depth, area, .. } = speed;
+    let over_speed = experiments.iter().filter(|e| Variable::Speed.cases().contains(&e.case));
     let slip_mm = largest(over_speed.flat_map(|e| &e.runs).map(|run| run.slip_mm));
     let gaps_by_speed = table("fig21", SECTION, [
         row("gap-grows-with-speed",
@@ -363,7 +362,7 @@ pub fn claims(data: &Data) -> Vec<Claim> {
             "Contact area and embedding depth change alike.", ""),
         depth.spread("depth-spread-speed", "means", 3),
         area.spread("area-spread-speed", "means", 2),
-        spreads_agree("depth-and-area-spreads-agree-speed", &data.speed),
+        spreads_agree("depth-and-area-spreads-agree-speed", speed),
     ]);
     [gaps_by_preload, depths_by_preload, gaps_by_speed, depths_by_speed].concat()
 }

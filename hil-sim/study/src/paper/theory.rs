@@ -6,7 +6,7 @@ use anyhow::{Context, Result};
 use interstage::units::Direction;
 
 use super::case::{Arms, Case};
-use super::histories::{History, INTERVAL_S, Instant};
+use super::history::{History, INTERVAL_S, Instant};
 use super::measure::{corner_area_mm2, step_area_mm2, stress_kpa};
 use hil_sim::plant::balance::{Axial, Balance};
 use hil_sim::plant::ring::{Motion, Ring, RingParameters};
@@ -77,16 +77,6 @@ pub fn mean_lift(case: &Case, drive: Drive) -> Result<Lift> {
     })
 }
 
-/// Contact area that belongs to a tread depth at lift-off, mm^2, by the nominal
-/// geometry: how a compression sensor's reading becomes an area.
-pub fn area_of_depth_mm2(case: &Case, depth_mm: f64) -> f64 {
-    let wheel = case.loads.rig().rig;
-    let above = wheel.wheel_radius_mm - wheel.step_height_mm;
-    let reach = wheel.wheel_radius_mm - depth_mm;
-    let ahead = (reach * reach - above * above).max(0.0).sqrt();
-    corner_area_mm2((wheel.wheel_radius_mm, wheel.wheel_width_mm), ahead, above)
-}
-
 /// Elements of the elastic ring of a deployment and its axial travel per step, mm.
 const COARSE: (usize, f64) = (1440, 0.02);
 
@@ -153,17 +143,6 @@ pub fn deployment(case: &Case, arms: &Arms) -> Result<History> {
 mod tests {
     use super::*;
     use crate::paper::case::Loads;
-
-    #[test]
-    fn a_depth_gives_the_area_that_the_corner_cuts_off() {
-        let case = Case::new(Loads::Prototype, 5.0, 33.3);
-        for ahead_mm in [0.5, 8.0, 12.5] {
-            let depth_mm = 25.0 - 21.0_f64.hypot(ahead_mm);
-            let exact = corner_area_mm2((25.0, 28.0), ahead_mm, 21.0);
-            let area = area_of_depth_mm2(&case, depth_mm);
-            assert!((area / exact - 1.0).abs() < 1e-9, "{area} {exact}");
-        }
-    }
 
     #[test]
     fn the_fitted_gaps_are_met_without_friction() {

@@ -3,17 +3,14 @@
 use std::ops::RangeInclusive;
 
 use super::case::{Case, Loads};
-use super::claims::{BySource, Column, Data, FALLS, RISES, goes, largest, row, table, within};
-use super::histories::Quantity::{self, Collision, Impact, Vibration};
+use super::claims::{BySource, FALLS, RISES, all_go, goes, largest, row, spans, table, within};
 use super::histories::{Histories, panels};
+use super::history::Quantity::{self, Collision, Impact, Vibration};
 use crate::figure::{Claim, Figure, SOURCES, Source};
 
 /// Cases: the study's four at a third of their preload, which spans the 33 to 40 N that
 /// it names. Its own table of them is not published.
 pub const CASES: [(f64, f64); 4] = [(5.0, 33.3), (5.0, 40.0), (8.0, 33.3), (3.0, 40.0)];
-
-/// The collision of the first transition.
-const FIRST: Column = Column::Peak(Collision, 0);
 
 /// Time of the first collision in the study, s.
 const FIRST_BEFORE_S: f64 = 2.0;
@@ -42,14 +39,13 @@ pub fn figure(all: &[Histories]) -> Figure {
 
 /// The claims about it.
 #[rustfmt::skip]
-pub fn claims(data: &Data) -> Vec<Claim> {
-    let all = data.histories(cases());
-    let [_, _, fast, _] = all;
+pub fn claims(all: &[Histories]) -> Vec<Claim> {
+    let all @ [_, _, fast, _]: [&Histories; 4] = std::array::from_fn(|i| &all[i]);
     let least = |of: &dyn Fn(&Histories) -> f64| all.map(of).into_iter().fold(1.0, f64::min);
     let shapes = Quantity::ALL.map(|quantity| least(&|one| likeness(one, quantity)));
     let falls = |quantity: Quantity| {
         let peaks = all.map(|one| one.peak_values(quantity));
-        let texts = cases().map(|case| data.peaks_text(quantity, case)).join(". ");
+        let texts = all.map(|one| one.peaks_text(quantity)).join(". ");
         let found = format!(
             "By stage, {} (theory; simulation; virtual rig). {texts}. Of what makes the stages \
              differ there is the inclination of the arm alone: its thrust on the wheel falls by a \
@@ -75,14 +71,16 @@ pub fn claims(data: &Data) -> Vec<Claim> {
         count_humps(first.map(|p| p.1), 0.05)
     });
     let pairs = |related: fn(&Case, &Case) -> bool, sense| {
-        let pairs = cases().into_iter().flat_map(|a| cases().map(|b| [a, b]));
-        let pairs: Vec<[Case; 2]> = pairs.filter(|[a, b]| related(a, b)).collect();
-        let text = |&[a, b]: &[Case; 2]| {
-            format!("{} to {}: {}", a.name(), b.name(), data.span(FIRST, [a, b], 1, "N"))
+        let pairs = all.into_iter().flat_map(|a| all.map(|b| [a, b]));
+        let pairs: Vec<_> = pairs.filter(|[a, b]| related(&a.case, &b.case)).collect();
+        let first = |pair: &[&Histories; 2]| pair.map(|one| one.peak(Collision, 0));
+        let text = |pair: &[&Histories; 2]| {
+            let [from, to] = pair.map(|one| one.case.name());
+            format!("{from} to {to}: {}", spans(first(pair), 1, "N"))
         };
         let texts = pairs.iter().map(text).collect::<Vec<_>>().join("; ");
         let found = format!("{texts} (theory, simulation, virtual rig).");
-        (pairs.iter().all(|&pair| data.goes(FIRST, pair, sense)), found)
+        (pairs.iter().all(|pair| all_go(first(pair), sense)), found)
     };
     table("fig24", "Analysis and discussion of test results", [
         row("three-sources-agree", (shapes.iter().all(|&shape| shape > 0.9), format!(
