@@ -12,7 +12,7 @@ use nalgebra::DMatrix;
 use super::IdentifyError;
 use super::forward::{Run, Trajectory};
 use super::least_squares::Noise;
-use super::least_squares::{Model, covariance, minimise};
+use super::least_squares::{Model, SETTLED, covariance, minimise};
 use super::record::{Record, Sample};
 use crate::scenario::TICK_S;
 
@@ -191,12 +191,12 @@ pub fn fit(
     ];
     // Where the screw is before it first moves.
     start.extend(runs.iter().map(|run| run.traces.preload_n[run.traces.span.start]));
-    let first = minimise(&model, &start)?;
+    let first = minimise(&model, &start, SETTLED)?;
     let residuals = model.remaining(&first.x, &first.at);
     for (log, residuals) in model.0.iter_mut().zip(&residuals) {
         log.weight = 1.0 / Noise::of(residuals).effective().max(LEAST_N);
     }
-    let fitted = minimise(&model, &first.x)?;
+    let fitted = minimise(&model, &first.x, SETTLED)?;
     let mid = |(ticks, _): &(Range<usize>, f64)| TICK_S * (0.5 * (ticks.start + ticks.end) as f64);
     Ok(Actuator {
         covariance: covariance(&fitted.jacobian)?,

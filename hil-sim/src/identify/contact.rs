@@ -12,7 +12,7 @@ use nalgebra::DMatrix;
 use super::IdentifyError;
 use super::coordinates::{Coordinates, FRICTION, OFF};
 use super::forward::{Channels, Run, Trajectory, derivatives, quotient, simulate};
-use super::least_squares::{Model, Noise, minimise, robust};
+use super::least_squares::{Model, NEAR, Noise, SETTLED, minimise, robust};
 
 /// Deviations that the first fit assumes: compression, mm, angle, mrad, effort, N; ten
 /// times those of the sensors, as the start may be far off.
@@ -126,16 +126,26 @@ pub fn fit(
     let start: Vec<f64> = coordinates.priors().iter().map(|prior| prior.mean).collect();
     // Friction shows in the creep, and only once the rest is in place.
     let held = coordinates.known(FRICTION, start[FRICTION], HELD_LN);
-    let first = minimise(&Weighted::new(runs, &held), &start)?;
+    let first = minimise(&Weighted::new(runs, &held), &start, NEAR)?;
+    refit(runs, coordinates, (&first.x, &first.at), offsets_ln)
+}
+
+/// The same from near the fit on: a point and the trajectories there.
+pub(super) fn refit(
+    runs: &[Run],
+    coordinates: &Coordinates,
+    (x, at): (&[f64], &[Trajectory]),
+    offsets_ln: &[f64],
+) -> Result<Contact, IdentifyError> {
     let mut model = Weighted::new(runs, coordinates);
-    model.reweigh(&first.x, &first.at);
-    let second = minimise(&model, &first.x)?;
+    model.reweigh(x, at);
+    let second = minimise(&model, x, NEAR)?;
     model.reweigh(&second.x, &second.at);
-    let mut fitted = minimise(&model, &second.x)?;
+    let mut fitted = minimise(&model, &second.x, SETTLED)?;
     for off in offsets_ln {
         let mut from = second.x.clone();
         from[FRICTION] += off;
-        let (left, other) = (fitted.residuals.norm(), minimise(&model, &from).ok());
+        let (left, other) = (fitted.residuals.norm(), minimise(&model, &from, SETTLED).ok());
         fitted = other.filter(|other| other.residuals.norm() < left).unwrap_or(fitted);
     }
     let blocks = model.blocks();

@@ -10,8 +10,10 @@ use nalgebra::{DMatrix, DVector, Dyn};
 
 use super::IdentifyError;
 
-/// Relative change of the sum of squares and of the coordinates at convergence.
-const SETTLED: f64 = 1e-6;
+/// Relative change of the sum of squares and of the coordinates at which a fit has settled, and one whose
+/// noise alone is asked for.
+pub(super) const SETTLED: f64 = 1e-6;
+pub(super) const NEAR: f64 = 1e-4;
 /// Most evaluations, in units of the number of coordinates.
 const MOST_EVALUATIONS: usize = 30;
 
@@ -71,14 +73,19 @@ impl<M: Model> LeastSquaresProblem<f64, Dyn, Dyn> for Problem<'_, M> {
     }
 }
 
-/// Minimises the sum of squares from `start` on. The minimum is a local one: a coordinate whose
-/// residuals vanish with it, as a time constant's do, is fitted by its logarithm.
-pub(crate) fn minimise<M: Model>(model: &M, start: &[f64]) -> Result<Fitted<M::At>, IdentifyError> {
+/// Minimises the sum of squares from `start` on, until a step changes it and the coordinates by less than
+/// the part `settled`. The minimum is a local one: a coordinate whose residuals vanish with it, as a time
+/// constant's do, is fitted by its logarithm.
+pub(crate) fn minimise<M: Model>(
+    model: &M,
+    start: &[f64],
+    settled: f64,
+) -> Result<Fitted<M::At>, IdentifyError> {
     let problem = Problem { model, x: DVector::from_column_slice(start), at: model.at(start) };
     let solver = LevenbergMarquardt::new()
-        .with_ftol(SETTLED)
-        .with_xtol(SETTLED)
-        .with_gtol(SETTLED)
+        .with_ftol(settled)
+        .with_xtol(settled)
+        .with_gtol(settled)
         .with_patience(MOST_EVALUATIONS);
     let (problem, report) = solver.minimize(problem);
     let settled = report.termination.was_successful()
@@ -213,7 +220,8 @@ mod tests {
 
     /// Relative errors of a and b, fitted from 1 and 2 on.
     fn errors(a: f64, b: f64) -> [f64; 2] {
-        let fitted = minimise(&Decay(decay(a, b), f64::exp), &[0.0, 2.0_f64.ln()]).unwrap();
+        let fitted =
+            minimise(&Decay(decay(a, b), f64::exp), &[0.0, 2.0_f64.ln()], SETTLED).unwrap();
         assert!(fitted.residuals.norm() < 1e-6, "{:?}", fitted.x);
         [fitted.x[0].exp() / a - 1.0, fitted.x[1].exp() / b - 1.0]
     }
@@ -233,7 +241,7 @@ mod tests {
     fn a_fit_that_stops_where_a_parameter_has_no_effect_is_refused() {
         let (a, b) = (4.0322, 1.5215);
         assert!(errors(a, b).iter().all(|error| error.abs() < 1e-6));
-        let stopped = minimise(&Decay(decay(a, b), |x| x), &[1.0, 2.0]).unwrap();
+        let stopped = minimise(&Decay(decay(a, b), |x| x), &[1.0, 2.0], SETTLED).unwrap();
         assert!(stopped.x[1] < 0.01, "{:?}", stopped.x);
         assert!(covariance(&stopped.jacobian).is_err());
     }
@@ -260,7 +268,7 @@ mod tests {
 
     #[test]
     fn a_model_without_an_answer_is_an_error() {
-        assert!(minimise(&Decay(vec![1.0; 10], f64::exp), &[f64::INFINITY, 2.0]).is_err());
+        assert!(minimise(&Decay(vec![1.0; 10], f64::exp), &[f64::INFINITY, 2.0], SETTLED).is_err());
     }
 
     /// First-order autoregression.

@@ -8,7 +8,7 @@
 use rayon::prelude::*;
 
 use super::IdentifyError;
-use super::least_squares::{Model, minimise};
+use super::least_squares::{Model, SETTLED, minimise};
 use crate::plant::balance::Axial;
 use crate::plant::crossing::{CrossingCase, cross};
 use crate::plant::ring::RingParameters;
@@ -120,7 +120,7 @@ pub fn fit(
     if hold {
         gaps.free[1] = HELD_LN;
     }
-    let fitted = minimise(&gaps, &gaps.start)?;
+    let fitted = minimise(&gaps, &gaps.start, SETTLED)?;
     Ok(tread(&fitted.x, &fitted.at))
 }
 
