@@ -4,6 +4,7 @@ use serde::Serialize;
 use toml::Table;
 
 use super::IdentifyError;
+use super::contact::Contact;
 use super::coordinates::{FRICTION, LOAD, STIFFENING, STIFFNESS, TAU};
 use super::forward::{CHANNELS, quotient};
 use super::least_squares::Noise;
@@ -116,22 +117,25 @@ pub fn accept(
     runs: &[Summary],
     readings: &[(usize, f64)],
 ) -> Result<Acceptance, IdentifyError> {
-    let once = judged(records, runs, readings, &[])?;
-    if once.passed { judged(records, runs, readings, &[-0.2, 0.2]) } else { Ok(once) }
+    let (once, fit) = judged(records, runs, readings, None)?;
+    if !once.passed {
+        return Ok(once);
+    }
+    judged(records, runs, readings, Some((&fit.contact, &[-0.2, 0.2]))).map(|(again, _)| again)
 }
 
 fn judged(
     records: &[Record],
     runs: &[Summary],
     readings: &[(usize, f64)],
-    offsets_ln: &[f64],
-) -> Result<Acceptance, IdentifyError> {
+    near: Option<(&Contact, &[f64])>,
+) -> Result<(Acceptance, Fit), IdentifyError> {
     let first = records.first().ok_or_else(|| IdentifyError::NoFit("there are no logs".into()))?;
     if let Some(other) = records.iter().find(|other| other.scenario.rig != first.scenario.rig) {
         let why = format!("its controller had other parameters than that of {}", first.name);
         return Err(IdentifyError::Log(other.name.clone(), why));
     }
-    let (found, fit) = fitted(records, &first.scenario, offsets_ln)?;
+    let (found, fit) = fitted(records, &first.scenario, near)?;
     let mut reasons = found.notes[..records.iter().map(|of| of.missing.len()).sum()].to_vec();
     reasons.extend(records.iter().zip(runs).filter_map(|(record, run)| {
         let fault = run.faults.first().map(|fault| fault.text.clone());
@@ -161,7 +165,7 @@ fn judged(
     reasons.extend(off);
     let off = gap.iter().filter(|of| !of.ok);
     reasons.extend(off.map(|of| format!("{}: the gap at step {}", of.log, of.step)));
-    Ok(Acceptance { passed: reasons.is_empty(), residuals, keys, gap, reasons })
+    Ok((Acceptance { passed: reasons.is_empty(), residuals, keys, gap, reasons }, fit))
 }
 
 /// A number as a table shows it.

@@ -5,6 +5,7 @@
 //! included, so that a systematic model error counts as one error and not as many
 //! independent readings.
 
+use std::cell::RefCell;
 use std::ops::Range;
 
 use nalgebra::DMatrix;
@@ -45,13 +46,15 @@ struct Weighted<'a> {
     measured: Vec<Channels>,
     coordinates: &'a Coordinates,
     weights: Vec<[f64; 3]>,
+    /// Where the derivatives were taken last, and those, by log: the next fit begins there.
+    taken: RefCell<(Vec<f64>, Vec<Vec<Channels>>)>,
 }
 
 impl<'a> Weighted<'a> {
     fn new(runs: &'a [Run], coordinates: &'a Coordinates) -> Self {
         let measured = runs.iter().map(Run::measured).collect();
         let weights = vec![FIRST.map(|deviation| 1.0 / deviation); runs.len()];
-        Self { runs, measured, coordinates, weights }
+        Self { runs, measured, coordinates, weights, taken: RefCell::default() }
     }
 
     /// Predicted less measured values, by log.
@@ -101,10 +104,15 @@ impl Model for Weighted<'_> {
     }
 
     fn jacobian(&self, x: &[f64], at: &Vec<Trajectory>) -> Option<Vec<Vec<f64>>> {
+        let mut taken = self.taken.borrow_mut();
+        if taken.0 != x {
+            let runs = self.runs.iter().zip(at);
+            let by = runs.map(|(run, at)| derivatives(run, self.coordinates, x, at));
+            *taken = (x.to_vec(), by.collect::<Result<_, _>>().ok()?);
+        }
         let mut columns = vec![Vec::new(); x.len()];
-        for (log, (run, at)) in self.runs.iter().zip(at).enumerate() {
-            let by = derivatives(run, self.coordinates, x, at).ok()?;
-            for (column, channels) in columns.iter_mut().zip(&by) {
+        for (log, by) in taken.1.iter().enumerate() {
+            for (column, channels) in columns.iter_mut().zip(by) {
                 column.extend(self.weighted(log, channels));
             }
         }
@@ -116,28 +124,33 @@ impl Model for Weighted<'_> {
     }
 }
 
-/// Fits the coordinates to the runs, then twice more with the noise that this leaves; the last time
-/// from these offsets of friction, too, which has small minima.
-pub fn fit(
-    runs: &[Run],
-    coordinates: &Coordinates,
-    offsets_ln: &[f64],
-) -> Result<Contact, IdentifyError> {
+/// Fits the coordinates to the runs, then twice more with the noise that this leaves.
+pub fn fit(runs: &[Run], coordinates: &Coordinates) -> Result<Contact, IdentifyError> {
     let start: Vec<f64> = coordinates.priors().iter().map(|prior| prior.mean).collect();
     // Friction shows in the creep, and only once the rest is in place.
     let held = coordinates.known(FRICTION, start[FRICTION], HELD_LN);
-    let first = minimise(&Weighted::new(runs, &held), &start, NEAR)?;
-    refit(runs, coordinates, (&first.x, &first.at), offsets_ln)
+    let mut model = Weighted::new(runs, &held);
+    let first = minimise(&model, &start, NEAR)?;
+    model.coordinates = coordinates;
+    refine(model, (&first.x, &first.at), &[])
 }
 
-/// The same from near the fit on: a point and the trajectories there.
+/// The twice more from near the fit on, a point and the trajectories there; the last time from these
+/// offsets of friction, too, which has small minima.
 pub(super) fn refit(
     runs: &[Run],
     coordinates: &Coordinates,
+    near: (&[f64], &[Trajectory]),
+    offsets_ln: &[f64],
+) -> Result<Contact, IdentifyError> {
+    refine(Weighted::new(runs, coordinates), near, offsets_ln)
+}
+
+fn refine(
+    mut model: Weighted<'_>,
     (x, at): (&[f64], &[Trajectory]),
     offsets_ln: &[f64],
 ) -> Result<Contact, IdentifyError> {
-    let mut model = Weighted::new(runs, coordinates);
     model.reweigh(x, at);
     let second = minimise(&model, x, NEAR)?;
     model.reweigh(&second.x, &second.at);
