@@ -94,8 +94,6 @@ pub struct WatchState {
     /// Largest compression to 3/2 over the load so far, and the part of it that an edge has lost.
     edge: Q16,
     pub(super) eased: Ratio,
-    /// Compression on the wall before the step, mm.
-    flat: Millimetres,
     lift: Option<Lift>,
     /// Compression as the wheel first sank so far; 0 where it has not.
     depths: [Millimetres; FALLS],
@@ -108,8 +106,8 @@ pub struct Lift {
     pub depth: Millimetres,
     /// Height of the centre above the lower wall, mm.
     pub height: Millimetres,
-    /// Gap with the nominal step height, mm.
-    pub gap_as_table: Millimetres,
+    /// Gap, mm.
+    pub gap: Millimetres,
     /// Axial distance between wheel centre and face, mm.
     pub distance: Millimetres,
 }
@@ -155,12 +153,12 @@ type Risen<'a> = (Direction, &'a WatchInput, Millimetres);
 /// Sensor values of a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WatchInput {
-    /// Wheel centre's distance from the pillar axis, mm.
+    /// Wheel centre's distance from the pillar axis by its low-pass, mm.
     pub radius: Millimetres,
-    /// Tread compression, mm.
+    /// Tread compression by its low-pass, mm.
     pub compression: Millimetres,
-    /// Preload, N.
-    pub pressed: Newtons,
+    /// Preload by its low-pass, N.
+    pub preload: Newtons,
     /// Travel of the tread.
     pub travel: Travel,
     /// A step is expected here: hold the baseline.
@@ -265,7 +263,6 @@ impl CrossingWatch {
         *state = WatchState {
             contact,
             baseline: LowPassState::at(baseline),
-            flat: state.flat,
             deepest: state.deepest,
             ..WatchState::default()
         };
@@ -341,8 +338,8 @@ impl CrossingWatch {
         let risen = (direction, seen, self.rise(state, direction, seen));
         if state.contact != Contact::Wall {
             state.deepest = state.deepest.max(seen.compression);
-            let pressed = seen.pressed.max(Newtons::ONE);
-            let bears = divide(seen.compression * sqrt(seen.compression), pressed);
+            let preload = seen.preload.max(Newtons::ONE);
+            let bears = divide(seen.compression * sqrt(seen.compression), preload);
             state.edge = state.edge.max(bears);
             state.eased = Ratio::ONE - divide(bears, state.edge.max(Q16::DELTA));
             if direction == Direction::Retract {
@@ -360,9 +357,6 @@ impl CrossingWatch {
         if rise < TOUCH {
             state.ticks = 0;
             let level = rise.abs() < HOLD;
-            if level {
-                state.flat = seen.compression;
-            }
             // What looks like the foot of a step, or a wheel rolling back off one, must not
             // drag the baseline along.
             let due = seen.travel.saturating_sub(state.sampled).saturating_abs() >= SAMPLE;
@@ -443,7 +437,7 @@ impl CrossingWatch {
                 Direction::Retract => self.step,
             };
             let base = state.baseline.output() + shift;
-            let gap_as_table = state.lift.map_or(Q16::ZERO, |lift| lift.gap_as_table);
+            let gap_as_table = state.lift.map_or(Q16::ZERO, |lift| lift.gap);
             state.baseline = LowPassState::at(base);
             self.touch(state, direction, seen);
             return Some(CrossingEvent::Retouched { gap_as_table });
@@ -467,13 +461,13 @@ impl CrossingWatch {
             state.lift.map_or([Q16::ZERO; 3], |lift| match direction {
                 Direction::Deploy => {
                     let seen = self.measure(lift.depth, lift.height, height);
-                    [seen.gap_as_table, lift.gap_as_table, seen.distance - lift.distance]
+                    [seen.gap, lift.gap, seen.distance - lift.distance]
                 }
                 // The lower wall carries from the height on that is known now. The edge was seen
                 // from the upper wall.
                 Direction::Retract => {
                     let depth = self.depth_at(state, height).unwrap_or(lift.depth);
-                    let gap = |step| self.measure(depth, self.radius, step).gap_as_table;
+                    let gap = |step| self.measure(depth, self.radius, step).gap;
                     [gap(height), gap(self.step), Q16::ZERO]
                 }
             });

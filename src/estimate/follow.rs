@@ -403,7 +403,7 @@ impl Estimator {
         open.lift = Some(LiftPoint {
             at: tick.now,
             position: state.position,
-            gap_as_table: lift.gap_as_table,
+            gap_as_table: lift.gap,
             history: *state.history.history(),
             distance: lift.distance,
             speed: state.crossing_speed.speed(FILTER_LAG, sensed.speed.value),
@@ -428,7 +428,7 @@ impl Estimator {
         WatchInput {
             radius: sensed.radius.value,
             compression: sensed.compression_filtered,
-            pressed: sensed.preload_filtered,
+            preload: sensed.preload_filtered,
             travel: sensed.travel,
             // A search does not know where its step is.
             near: to_window.is_some_and(|ahead| ahead <= Q16::ZERO) && !state.known.is_searching(),

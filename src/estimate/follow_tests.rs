@@ -67,8 +67,7 @@ fn a_step_that_sets_the_position_has_its_crossing_there() {
         EstimateState { known: Position::Searching, next_step: 1, ..EstimateState::default() };
     state.set_position(sensed.travel, place - q16(13_000_000));
     state.crossing = Some(OpenCrossing { step: 1, ..OpenCrossing::default() });
-    let lift =
-        Lift { depth: Q16::ZERO, height: Q16::ZERO, gap_as_table: Q16::ZERO, distance: Q16::ZERO };
+    let lift = Lift { depth: Q16::ZERO, height: Q16::ZERO, gap: Q16::ZERO, distance: Q16::ZERO };
     estimator.lifted(&mut state, &tick, lift, &mut Findings::default());
     let point = state.crossing.and_then(|open| open.lift).expect("lifted");
     assert_eq!((point.face, point.position, point.residual), (place, place, Q16::ZERO));

@@ -121,11 +121,11 @@ impl Senses {
         let counted = frame.get(SensorId::WheelEncoder, EncoderCount::new);
         let motion =
             self.wheel_encoder.step(&mut state.wheel_encoder, now, counted, acceleration, limit);
-        let pressing = frame.get(SensorId::PreloadSensor, AdcCode::new);
-        let preload = self.preload_sensor.step(&mut state.preload_sensor, now, pressing, limit);
-        let pressed = frame.get(SensorId::CompressionSensor, AdcCode::new);
+        let code = frame.get(SensorId::PreloadSensor, AdcCode::new);
+        let preload = self.preload_sensor.step(&mut state.preload_sensor, now, code, limit);
+        let code = frame.get(SensorId::CompressionSensor, AdcCode::new);
         let compression =
-            self.compression_sensor.step(&mut state.compression_sensor, now, pressed, limit);
+            self.compression_sensor.step(&mut state.compression_sensor, now, code, limit);
         let turned = frame.get(SensorId::ArmAngle, AngleFrame::new);
         let angle = self.arm_angle.step(&mut state.arm_angle, now, turned, limit);
         let (radius, tan_arm) = self.arm.stance(angle.filtered);

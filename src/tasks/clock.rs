@@ -4,7 +4,7 @@ use super::exchange::Exchange;
 use crate::units::Tick;
 use embassy_time::{Duration, Instant, Timer};
 
-/// Wakes the sensor tasks and the control tick at each whole millisecond.
+/// Wakes the sensor tasks that are due and the control tick at each whole millisecond.
 ///
 /// Time stamps are whole milliseconds, so that they do not jitter. A missed millisecond is
 /// skipped: a late tick is followed by a timely one, not by a burst.

@@ -31,7 +31,7 @@ pub enum Event {
     Fault(Fault),
     /// A limit became active.
     Limit(Limit),
-    /// A crossing's ledger line was closed.
+    /// A crossing was reviewed.
     Crossing(CrossingRecord),
     /// Number of log entries dropped here because the journal did not keep up.
     Lost(u32),

@@ -155,7 +155,7 @@ impl PlantParameters {
         let radius_mm = rig.rig.wheel_radius_mm + draw.offset(spread.wheel_radius_mm)
             - spread.wear_mm * draw.0.random::<f64>();
         let preload_sensor_gain = draw.factor(spread.preload_sensor_gain_rel);
-        let tread_gain = draw.factor(spread.compression_sensor_gain_rel);
+        let compression_gain = draw.factor(spread.compression_sensor_gain_rel);
         let angle_zero_rad = draw.offset(spread.arm_angle_zero_deg).to_radians();
         let steps = steps
             .iter()
@@ -216,7 +216,7 @@ impl PlantParameters {
                 preload_full_scale_n: rig.sense.preload_full_scale_n,
                 preload_sensor_gain,
                 tread_full_scale_mm: rig.sense.tread_full_scale_mm,
-                tread_gain,
+                compression_gain,
                 angle_zero_code: rig.sense.angle_zero_code,
                 angle_zero_rad,
                 readback_gain,

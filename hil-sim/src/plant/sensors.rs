@@ -98,7 +98,7 @@ pub static SENSORS: [SensorModel; SensorId::COUNT] = [
         coding: Coding::Converter,
         truth: |t| t.compression_mm,
         noise: |n| (n.compression_sensor_delay_s, n.compression_sensor_mm),
-        number: |p, mm, noise| bridge((mm * p.tread_gain + noise) / p.tread_full_scale_mm),
+        number: |p, mm, noise| bridge((mm * p.compression_gain + noise) / p.tread_full_scale_mm),
         scale: |rig| bridge_scale(rig.sense.tread_full_scale_mm),
         faults: (1.2, (0.3, 5.0, "mm", MORE)),
     },
@@ -113,8 +113,7 @@ pub static SENSORS: [SensorModel; SensorId::COUNT] = [
 ];
 
 section! {
-    /// Noise of the sensors, one standard deviation, and their conversion delays. By default they
-    /// quantise, but have neither.
+    /// Noise of the sensors, one standard deviation, and their conversion delays.
     #[derive(Default)]
     Noise {
         /// Preload sensor, N.
@@ -148,7 +147,7 @@ pub struct SensorParameters {
     /// Full scale at 90 % of the converter, mm.
     pub tread_full_scale_mm: f64,
     /// Gain error factor.
-    pub tread_gain: f64,
+    pub compression_gain: f64,
     /// Code with the arm along the pillar.
     pub angle_zero_code: f64,
     /// Zero error, rad.

@@ -25,6 +25,9 @@ use crate::table::counted;
 /// Largest distance from the end of travel after arrival, mm: twice the effect of creep and
 /// wheel radius on the drawn rigs.
 const ARRIVED_WITHIN_MM: f64 = 1.0;
+/// Largest distance of a step from where the controller found it, mm: the most that a rig may have as
+/// its `rig.step_tolerance_mm`, which is less than half of what parts two steps.
+const SAME_STEP_MM: f64 = 5.0;
 
 /// The record of a run that goes on.
 #[derive(Default)]
@@ -184,7 +187,7 @@ fn crossing_line(crossing: &Crossing, reported: &[(f64, CrossingRecord)]) -> Cro
     let same = |(t_s, r): &&(f64, CrossingRecord)| {
         *t_s >= crossing.lift_s
             && (r.direction == Direction::Deploy) == crossing.climbing
-            && (r.position.to_num::<f64>() - crossing.step_mm).abs() < 5.0
+            && (r.position.to_num::<f64>() - crossing.step_mm).abs() < SAME_STEP_MM
     };
     let reported = reported.iter().find(same);
     let num = |f: fn(&CrossingRecord) -> Q16| reported.map(|(_, r)| f(r).to_num::<f64>());
@@ -301,7 +304,7 @@ fn drawn(plant: &PlantParameters, scenario: &Scenario) -> Map<String, Value> {
         ("preload.lag_s", json!(plant.lag_s)),
         ("preload.slew_n_per_s", json!(plant.slew_n_per_s)),
         ("preload sensor gain", json!(plant.sensors.preload_sensor_gain)),
-        ("compression sensor gain", json!(plant.sensors.tread_gain)),
+        ("compression sensor gain", json!(plant.sensors.compression_gain)),
         ("arm angle zero, deg", json!(plant.sensors.angle_zero_rad.to_degrees() + 0.0)),
     ];
     let mut all: Map<String, Value> =

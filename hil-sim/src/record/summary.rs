@@ -19,6 +19,7 @@ pub struct CrossingLine {
     pub preload_n: f64,
     /// True gap: clearance between step root and undeformed wheel at that instant, mm.
     pub gap_mm: f64,
+    /// The controller's, mm; none if it reported none: of the tread rolled out, and measured.
     pub gap_predicted_mm: Option<f64>,
     pub gap_measured_mm: Option<f64>,
     /// Largest force of corner and face on the wheel, N.
@@ -205,7 +206,7 @@ pub struct LedgerLine {
     pub index: u8,
     /// Whether the step was climbed; else it was dropped off.
     pub climbed: bool,
-    /// Position at which the step was detected, mm.
+    /// Where the step was found, mm of travel.
     pub step_found_mm: f64,
     /// Found position minus table, mm.
     pub residual_mm: f64,

@@ -32,7 +32,7 @@ fn seed_0_is_the_nominal_rig() {
     let steps = plant.wall.steps().iter();
     let steps: Vec<f64> = steps.map(|step| step.position_mm).collect();
     assert_eq!(steps[..], rig.rig.step_positions_mm[..]);
-    assert_eq!((plant.sensors.preload_sensor_gain, plant.sensors.tread_gain), (1.0, 1.0));
+    assert_eq!((plant.sensors.preload_sensor_gain, plant.sensors.compression_gain), (1.0, 1.0));
     assert_eq!(plant.sensors.angle_zero_rad, 0.0);
     // Without spread every seed is that rig.
     let mut narrow = Scenario { spread: Spread::default(), ..scenario };
@@ -66,7 +66,7 @@ fn the_draws_mean_what_the_spread_documents() {
         ("lag", spread.lag_rel, |p| p.lag_s),
         ("slew", spread.slew_rel, |p| p.slew_n_per_s),
         ("preload_sensor_gain", spread.preload_sensor_gain_rel, |p| p.sensors.preload_sensor_gain),
-        ("tread_gain", spread.compression_sensor_gain_rel, |p| p.sensors.tread_gain),
+        ("compression_gain", spread.compression_sensor_gain_rel, |p| p.sensors.compression_gain),
     ];
     let mut columns = Vec::new();
     for (name, deviation, of) in relative {

@@ -36,7 +36,7 @@ mod tests {
         WatchInput {
             radius: Q16::from_num(radius),
             compression: Q16::from_num(compression),
-            pressed: q16(33_300_000),
+            preload: q16(33_300_000),
             travel: Travel::ZERO,
             near: false,
             over: false,

@@ -50,7 +50,7 @@ impl CrossingWatch {
         Lift {
             depth,
             height,
-            gap_as_table: sqrt((reach * reach + chord).max(Q16::ZERO)) - self.radius,
+            gap: sqrt((reach * reach + chord).max(Q16::ZERO)) - self.radius,
             distance: sqrt((reach * reach - over * over).max(Q16::ZERO)),
         }
     }

@@ -31,8 +31,8 @@ const STIFFER: Ratio = q16(1_100_000);
 const LN_STIFFER: Ratio = q16(95_310);
 /// Least relative change of a gap with the logarithm of the stiffness.
 const LEAST_SENSITIVITY: Ratio = q16(100_000);
-/// One sigma of a measured gap against the rolled one, mm: two readings of an arm angle of 0.056 mm
-/// a code make 0.023, a rollout's 0.7 % 0.018, and the preload sensor's 1.5 % 0.02.
+/// One sigma of a measured gap against the rolled one, mm: two readings of an arm angle of which a
+/// code is at most 0.056 mm of radius make 0.023, a rollout's 0.7 % 0.018, and the preload sensor's 1.5 % 0.02.
 const MEASURED_WITHIN: Millimetres = q16(36_000);
 /// Largest difference of the logarithm of a stiffness that one crossing may show.
 const MOST_OFF: Ratio = q16(1_000_000);
