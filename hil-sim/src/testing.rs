@@ -78,9 +78,12 @@ fn passes(long: bool) -> Vec<(&'static str, &'static str, Command)> {
         clippy
     };
     let images = ["--package", "interstage", "--package", "interstage-images"];
-    let images = [&images[..], &["--lib", "--bins", "--target", TARGET]].concat();
-    let looped = ["--package", "interstage", "--bin", "interstage", "--target", TARGET];
-    let looped = [&looped[..], &["--no-default-features", "--features", "hil"]].concat();
+    // As the images are built, which so find their build scripts and macros.
+    let for_board = ["--release", "--target", TARGET];
+    let images = [&images[..], &["--lib", "--bins"], &for_board].concat();
+    let looped = ["--package", "interstage", "--bin", "interstage"];
+    let looped =
+        [&looped[..], &["--no-default-features", "--features", "hil"], &for_board].concat();
     // `--examples` gives the dependencies the features that they have in the tests.
     let mut documentation = cargo(&["doc", "--workspace", "--no-deps", "--lib", "--examples"]);
     documentation.env("RUSTDOCFLAGS", "-D warnings");

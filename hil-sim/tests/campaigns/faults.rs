@@ -34,10 +34,12 @@ fn every_fault_is_found_or_tolerated_and_the_mechanism_held() {
 #[test]
 fn urgent_faults_are_found_at_once() {
     let faults = [("drive runaway", 128), ("pretightener runaway", 129), ("tick overrun", 160)];
-    let outcome = campaign(100, |name| faults.iter().any(|(fault, _)| name == *fault));
+    let instants = if long() { 100 } else { 20 };
+    let outcome = campaign(instants, |name| faults.iter().any(|(fault, _)| name == *fault));
     for (fault, code) in faults {
         let line = line(&outcome, fault);
-        assert!(line.found + line.tolerated == 100 && line.found > 90, "{line:?}");
+        let all = line.found + line.tolerated;
+        assert!(all == instants && 10 * line.found >= 9 * all, "{line:?}");
         assert_eq!(line.code, Some(code), "{line:?}");
         assert!(line.latency_ms.is_some_and(|ms| ms <= 10.0), "{line:?}");
     }
