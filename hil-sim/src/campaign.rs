@@ -1,5 +1,6 @@
 //! A campaign: many cases, each computed by itself, and what is made of all of them. Each but
-//! `sweep`'s is in a module of its own (as in `montecarlo`); its verb in `cli/` names it in `cli.rs`.
+//! `sweep`'s is in a module of its own (as in `montecarlo`); its verb in `cli/` (as `stress.rs`) is in
+//! `cli.rs` a module, a `Verb`, and a line each of `Verb::campaign` and `Verb::run`.
 
 mod frame;
 mod shard;
@@ -25,7 +26,7 @@ type Fold<'a, C, L, O> = dyn FnOnce(Vec<(C, L)>) -> O + 'a;
 
 /// Cases, how one is computed, and what is made of all.
 pub struct Campaign<'a, C, L, O, E> {
-    /// What the steps of a case are called, and how many there are at most.
+    /// What the steps of a case are called, and how many there are at most, each a call of `done`.
     pub steps: (&'static str, usize),
     /// The cases.
     pub cases: Vec<C>,

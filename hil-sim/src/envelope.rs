@@ -5,11 +5,11 @@
 mod grid;
 mod picture;
 
-use interstage::model::Planner;
 use serde::{Deserialize, Serialize};
 
 use crate::campaign::{Campaign, Watch};
 use crate::compare::STRATEGIES;
+use crate::plant::rig::VirtualRig;
 use crate::report::verdict::SLIP_SEEN_MM;
 use crate::scenario::{ControllerKind, Scenario};
 use crate::session::{Options, RunError, Session, run_session};
@@ -114,8 +114,8 @@ pub fn campaign(
     scenario: &Scenario,
     grid: Grid,
 ) -> Result<Campaign<'_, Place, Vec<Cell>, Envelope, RunError>, RunError> {
-    Planner::try_build(&scenario.rig)?;
-    scenario.plant().check(scenario.rig.preload.limit_n)?;
+    // What is refused everywhere is no outcome.
+    Session::new(scenario, Options::default())?;
     let (frictions, loads_n) = (grid.frictions(), grid.loads_n());
     let mut cases = Vec::new();
     for known in [true, false] {
@@ -145,16 +145,14 @@ fn cell(scenario: &Scenario, (known, friction, load_n): Place, controller: Contr
         let loads = &mut scenario.rig.plant;
         (loads.mu, loads.top_load_n, loads.top_load_share) = (friction, load_n, 1.0);
     }
-    let run = || {
-        let session = Session::new(&scenario, Options::default())?;
-        // The plant has exactly these, whatever its seed draws.
-        let session = session.with_plant(|plant| {
-            plant.set_friction(friction);
-            plant.set_load(load_n);
-        });
-        run_session(session, &scenario)
+    // The plant has exactly these, whatever its seed draws.
+    let given = |plant: &mut VirtualRig| {
+        plant.set_friction(friction);
+        plant.set_load(load_n);
     };
-    let summary = run().ok().map(|recording| recording.summary);
+    let session = Session::new(&scenario, Options::default());
+    let recording = session.and_then(|session| run_session(session.with_plant(given), &scenario));
+    let summary = recording.ok().map(|recording| recording.summary);
     let completed = summary.as_ref().is_some_and(|summary| summary.completed);
     Cell {
         friction,

@@ -1,7 +1,7 @@
 //! `rig test`: checks every change in a few passes of cargo.
 //!
-//! Format, lints, documentation, the images that the tests run, the tests. All but the
-//! images use the profile that `rig` itself is built in, so nothing is compiled twice.
+//! Format, lints, documentation, the images that the tests run, the tests. All but what is
+//! for the board use the profile that `rig` itself is built in, so nothing is compiled twice.
 
 use std::env;
 use std::process::{Command, ExitStatus, Stdio};
@@ -77,13 +77,11 @@ fn passes(long: bool) -> Vec<(&'static str, &'static str, Command)> {
         clippy.args(arguments).args(DENY);
         clippy
     };
-    let images = ["--package", "interstage", "--package", "interstage-images"];
     // As the images are built, which so find their build scripts and macros.
-    let for_board = ["--release", "--target", TARGET];
-    let images = [&images[..], &["--lib", "--bins"], &for_board].concat();
-    let looped = ["--package", "interstage", "--bin", "interstage"];
-    let looped =
-        [&looped[..], &["--no-default-features", "--features", "hil"], &for_board].concat();
+    let board = ["--release", "--target", TARGET, "--package", "interstage"];
+    let images = [&board[..], &["--package", "interstage-images", "--lib", "--bins"]].concat();
+    let hil = ["--bin", "interstage", "--no-default-features", "--features", "hil"];
+    let looped = [&board[..], &hil].concat();
     // `--examples` gives the dependencies the features that they have in the tests.
     let mut documentation = cargo(&["doc", "--workspace", "--no-deps", "--lib", "--examples"]);
     documentation.env("RUSTDOCFLAGS", "-D warnings");

@@ -133,8 +133,8 @@ impl CampaignArgs {
         self.given.is_some()
     }
 
-    /// Runs what is asked for of a campaign with these parameters, or takes it from the parts.
-    /// Ctrl-C ends it with what is done.
+    /// Runs what is asked for of a campaign, or takes it from the parts. Ctrl-C ends it with what is
+    /// done. `parameters` and the command say all that decides cases and lines: parts must agree in both.
     pub(super) fn carry_out<C, L, O, E>(
         &self,
         parameters: String,

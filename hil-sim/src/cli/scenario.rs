@@ -59,7 +59,7 @@ pub struct RunArgs {
     #[arg(long, value_name = "NAME", value_parser = PossibleValuesParser::new(ControllerKind::NAMES))]
     controller: Option<String>,
 
-    /// A fault and its onset in seconds from boot, as in supply.weak@2, in place of the scenario's
+    /// A fault and its onset in seconds from boot, as in wheel.slip@2, in place of the scenario's
     /// `run.faults`, which can say more; may be repeated.
     #[arg(long, alias = "board-fault", value_name = "TARGET.KIND@S")]
     fault: Vec<String>,
@@ -136,7 +136,7 @@ fn entry_of(text: &String) -> Result<String, Failure> {
     let parts = text.split_once('@').and_then(|(fault, at)| Some((fault.split_once('.')?, at)));
     let at = parts.and_then(|(_, at)| at.parse::<f64>().ok()).filter(|at| at.is_finite());
     let (Some(((target, kind), _)), Some(at)) = (parts, at) else {
-        let error = format!("--fault {text}: expected TARGET.KIND@SECONDS, as in supply.weak@2");
+        let error = format!("--fault {text}: expected TARGET.KIND@SECONDS, as in wheel.slip@2");
         return Err(Failure::input(error));
     };
     Ok(format!("{{target={target:?},kind={kind:?},at_s={at:?}}}"))

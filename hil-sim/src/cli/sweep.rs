@@ -125,6 +125,10 @@ fn axes(args: &Args, base: &Scenario) -> Result<Vec<Axis>, Failure> {
         if axes[..index].iter().any(|other| other.key == axis.key) {
             return Err(Failure::input(format!("--key {}: given twice", axis.key)));
         }
+        if base.keys().iter().any(|info| info.key == axis.key && info.value.is_array()) {
+            let why = "takes a list, which no sweep varies";
+            return Err(Failure::input(format!("--key {}: {why}", axis.key)));
+        }
         if !args.crossing && [SPEED, PRELOAD].contains(&&*axis.key) {
             return Err(Failure::input(format!("--key {}: takes --crossing", axis.key)));
         }

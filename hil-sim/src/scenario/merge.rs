@@ -1,7 +1,7 @@
 //! Lays values over a preset key by key: reads each from the text of an override or a file, and
 //! checks it for what its key takes and for units that are part of the key's name.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use interstage::rig::MAX_STEPS;
@@ -265,9 +265,8 @@ impl Entry<'_> {
         const ONSETS: [&str; 3] = ["at_s", "at_mm", "at_crossing"];
         const FIELDS: [&str; 5] = ["at_s", "at_mm", "at_crossing", "duration_s", "magnitude"];
         let all: Vec<&injection::Entry> = CATALOGUE.iter().chain(HARDWARE).collect();
-        let mut targets: Vec<String> = all.iter().map(|entry| entry.target.name()).collect();
-        targets.dedup();
-        let target = self.word("target", targets)?;
+        let targets: BTreeSet<String> = all.iter().map(|entry| entry.target.name()).collect();
+        let target = self.word("target", targets.into_iter().collect())?;
         let kinds = all.iter().filter(|entry| entry.target.name() == target);
         self.word("kind", kinds.map(|entry| entry.kind.name()).collect())?;
         let hint = format!("; a fault takes target, kind, {}", FIELDS.join(", "));
