@@ -9,6 +9,7 @@ use hil_sim::probe::Port;
 use hil_sim::record::Run;
 use hil_sim::replay::replay;
 use hil_sim::scenario::Scenario;
+use hil_sim::testing::long;
 use interstage::params::Refusal;
 use interstage::params::link::{ToBoard, frame};
 use interstage::params::service::Request;
@@ -113,7 +114,7 @@ fn each_mistake_in_the_wiring_is_named_and_nothing_else_is_blamed() {
     let all = Mistake::value_variants();
     assert!(all.iter().all(|known| FOUND.iter().any(|(mistake, ..)| mistake == known)));
     let mut wrong = Vec::new();
-    for (mistake, name, phrase) in FOUND {
+    for (mistake, name, phrase) in FOUND.iter().step_by(2 - usize::from(long())) {
         let progress = power_up(&[*mistake]);
         let failed: Vec<_> = progress.checks().filter(|check| !check.ok).collect();
         let named =
