@@ -281,7 +281,7 @@ fn every_mistake_of_a_fault_is_named() {
         assert!(found.starts_with(&message), "{found}");
     }
     let found = error("[[run.faults]]\nkind = \"off\"\nat_s = 1");
-    assert!(found.contains("run.faults[1].target = nothing: expected \"encoder\""), "{found}");
+    assert!(found.contains("].target = nothing: expected \"angle\" or \"angle-bus\""), "{found}");
 }
 
 #[test]
