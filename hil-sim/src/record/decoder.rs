@@ -64,11 +64,8 @@ pub enum Mark {
     },
     /// The target restarted.
     Restart,
-    /// A frame of another layout than this reader knows.
-    Schema {
-        /// Its number.
-        found: u16,
-    },
+    /// A frame of another layout than this reader knows, and its number.
+    Schema { found: u16 },
 }
 
 impl std::fmt::Display for Mark {

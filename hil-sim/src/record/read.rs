@@ -69,7 +69,9 @@ impl Run {
             run
         };
         if run.rows.is_empty() {
-            return Err(no_log("it holds no tick".to_owned()));
+            let other = run.marks.iter().find(|(_, mark)| matches!(mark, Mark::Schema { .. }));
+            let why = other.map_or("it holds no tick".to_owned(), |(_, mark)| mark.to_string());
+            return Err(no_log(why));
         }
         Ok(run)
     }
