@@ -342,7 +342,7 @@ impl Estimator {
                     state.odometry.set_by_step(sensed.travel, state.position - moved);
                 } else if open.slip.lost > moved.abs() {
                     // More slip than creep: what the wheel slipped in all.
-                    open.slip.beside = moved;
+                    open.slip.beside += moved;
                     state.odometry.slip(moved, Q16::ZERO);
                 } else {
                     state.odometry.climb(state.position, moved);

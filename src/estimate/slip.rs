@@ -60,9 +60,10 @@ pub struct CornerSlip {
     outermost: Millimetres,
     /// Noise of the face where it slipped, mm.
     noise: Millimetres,
-    /// Slip so far, mm: travel of the tread that moved no axle, or of the axle that no tread made.
+    /// Axial slip so far, mm: travel of the tread that moved no axle, or of the axle that no tread made.
     pub lost: Millimetres,
-    /// What it is more by the place of the edge in the end, mm.
+    /// What the tread slipped beyond it, mm: it turns across the edge, and the place of the edge in the
+    /// end shows more.
     pub beside: Millimetres,
 }
 
@@ -99,6 +100,7 @@ impl CornerSlip {
             (self.mark, self.outermost, self.slipping) = (now, face, true);
             self.noise = self.noise.max(noise);
             self.lost += lost;
+            self.beside += divide(lost, along) - lost;
             return lost;
         }
         if rise < bound - noise {
@@ -153,7 +155,7 @@ mod tests {
     /// its table; the compression sensor misses the part `missed`. Returns what was found.
     fn found(at: f64, slip: f64, rate: f64, noise: f64, (error, missed): (f64, f64)) -> f64 {
         let (mut watch, mut taken, mut ahead, mut lost) = (CornerSlip::default(), 0.0, 13.0, 0.0);
-        let reach = R - DEPTH;
+        let (reach, mut slipped) = (R - DEPTH, 0.0);
         for tick in 0..900 {
             let turned = 0.01 * f64::from(tick);
             let over = (reach * reach - f64::powi(ahead, 2)).sqrt();
@@ -170,9 +172,13 @@ mod tests {
             let along = 0.01 * over / reach;
             let slips = if turned > at && lost < slip { along * rate } else { 0.0 };
             lost += slips;
+            slipped += slips * reach / over;
             ahead -= along - slips;
         }
         assert_eq!(watch.lost.to_num::<f64>(), taken);
+        // The tread slips along the arc of the axle.
+        let more = taken * (slipped / lost.max(1e-9) - 1.0);
+        assert!((watch.beside.to_num::<f64>() - more).abs() < 0.03 * (taken + 0.01), "{more}");
         taken
     }
 
