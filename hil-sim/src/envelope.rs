@@ -9,7 +9,6 @@ use serde::{Deserialize, Serialize};
 
 use crate::campaign::{Campaign, Watch};
 use crate::compare::STRATEGIES;
-use crate::plant::rig::VirtualRig;
 use crate::report::verdict::SLIP_SEEN_MM;
 use crate::scenario::{ControllerKind, Scenario};
 use crate::session::{Options, RunError, Session, run_session};
@@ -146,12 +145,13 @@ fn cell(scenario: &Scenario, (known, friction, load_n): Place, controller: Contr
         (loads.mu, loads.top_load_n, loads.top_load_share) = (friction, load_n, 1.0);
     }
     // The plant has exactly these, whatever its seed draws.
-    let given = |plant: &mut VirtualRig| {
-        plant.set_friction(friction);
-        plant.set_load(load_n);
-    };
-    let session = Session::new(&scenario, Options::default());
-    let recording = session.and_then(|session| run_session(session.with_plant(given), &scenario));
+    let session = Session::new(&scenario, Options::default()).map(|session| {
+        session.with_plant(|plant, _| {
+            plant.set_friction(friction);
+            plant.set_load(load_n);
+        })
+    });
+    let recording = session.and_then(|session| run_session(session, &scenario));
     let summary = recording.ok().map(|recording| recording.summary);
     let completed = summary.as_ref().is_some_and(|summary| summary.completed);
     Cell {

@@ -15,9 +15,6 @@ use crate::provision::Tools;
 /// Set while the long samples are wanted.
 const LONG: &str = "RIG_LONG";
 
-/// Makes the compiler's warnings errors.
-const DENY: [&str; 3] = ["--", "-D", "warnings"];
-
 /// Whether tests run their long samples: as `rig test --long` asks them to.
 pub fn long() -> bool {
     env::var_os(LONG).is_some()
@@ -74,7 +71,7 @@ pub fn run(arguments: &[String], long: bool) -> Result<u8> {
 fn passes(long: bool) -> Vec<(&'static str, &'static str, Command)> {
     let lint = |arguments: &[&str]| {
         let mut clippy = cargo(&["clippy"]);
-        clippy.args(arguments).args(DENY);
+        clippy.args(arguments).args(["--", "-D", "warnings"]);
         clippy
     };
     // As the images are built, which so find their build scripts and macros.

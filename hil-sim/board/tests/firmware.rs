@@ -47,7 +47,7 @@ fn software(scenario: &Scenario, first: u32, command: u32) -> Recording {
     // The bench reads the sensors as power comes up too.
     for _ in 0..=first {
         session.sense();
-        session = session.with_plant(|plant| {
+        session = session.with_plant(|plant, _| {
             plant.step(&Drives::default(), 1e-3).expect("a sound plant");
         });
     }

@@ -11,7 +11,7 @@ use std::ops::Range;
 use nalgebra::DMatrix;
 
 use super::IdentifyError;
-use super::coordinates::{Coordinates, FRICTION, OFF};
+use super::coordinates::{Coordinates, FRICTION, OFF, Prior};
 use super::forward::{Channels, Run, Trajectory, derivatives, quotient, simulate};
 use super::least_squares::{Model, NEAR, Noise, SETTLED, minimise, robust};
 
@@ -30,6 +30,8 @@ const BLOCKS: [usize; 3] = [16, 16, 4];
 const WIDENED: f64 = 1.18 * 1.9;
 /// Deviation of friction while nothing determines it, logarithm.
 const HELD_LN: f64 = 0.02;
+/// Derivatives are kept while a coordinate has moved by no more than this part of its deviation.
+const KEPT: f64 = 0.5;
 
 /// The result.
 #[derive(Clone, Debug)]
@@ -46,7 +48,7 @@ struct Weighted<'a> {
     measured: Vec<Channels>,
     coordinates: &'a Coordinates,
     weights: Vec<[f64; 3]>,
-    /// Where the derivatives were taken last, and those, by log: the next fit begins there.
+    /// Where the derivatives were taken last, and those, by log.
     taken: RefCell<(Vec<f64>, Vec<Vec<Channels>>)>,
 }
 
@@ -81,6 +83,18 @@ impl<'a> Weighted<'a> {
         self.weights = self.remaining(x, at).iter().map(of).collect();
     }
 
+    /// Derivatives over the deviations, coordinate after coordinate; behind the logs' the priors'.
+    fn columns(&self, by_log: &[Vec<Channels>]) -> Vec<Vec<f64>> {
+        let priors = self.coordinates.priors();
+        let of = |(index, own): (usize, &Prior)| {
+            let logs = by_log.iter().enumerate();
+            let logs = logs.flat_map(|(log, by)| self.weighted(log, &by[index]));
+            let prior = |i: usize| if i == index { 1.0 / own.deviation } else { 0.0 };
+            logs.chain((0..priors.len()).map(prior)).collect()
+        };
+        priors.iter().enumerate().map(of).collect()
+    }
+
     /// All values of a log over their deviations.
     fn weighted<'b>(&self, log: usize, channels: &'b Channels) -> impl Iterator<Item = f64> + 'b {
         let each = channels.iter().zip(self.weights[log]);
@@ -105,20 +119,15 @@ impl Model for Weighted<'_> {
 
     fn jacobian(&self, x: &[f64], at: &Vec<Trajectory>) -> Option<Vec<Vec<f64>>> {
         let mut taken = self.taken.borrow_mut();
-        if taken.0 != x {
+        let mut columns = self.columns(&taken.1);
+        let moved = || columns.iter().zip(x.iter().zip(&taken.0));
+        let change = |row: usize| moved().map(|(by, (x, at))| by[row] * (x - at)).sum::<f64>();
+        let square: f64 = (0..columns[0].len()).map(|row| change(row).powi(2)).sum();
+        if taken.0.is_empty() || square > KEPT * KEPT {
             let runs = self.runs.iter().zip(at);
             let by = runs.map(|(run, at)| derivatives(run, self.coordinates, x, at));
             *taken = (x.to_vec(), by.collect::<Result<_, _>>().ok()?);
-        }
-        let mut columns = vec![Vec::new(); x.len()];
-        for (log, by) in taken.1.iter().enumerate() {
-            for (column, channels) in columns.iter_mut().zip(by) {
-                column.extend(self.weighted(log, channels));
-            }
-        }
-        for (index, column) in columns.iter_mut().enumerate() {
-            let priors = self.coordinates.priors().iter().enumerate();
-            column.extend(priors.map(|(i, p)| if i == index { 1.0 / p.deviation } else { 0.0 }));
+            columns = self.columns(&taken.1);
         }
         Some(columns)
     }

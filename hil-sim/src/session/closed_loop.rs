@@ -97,15 +97,10 @@ impl Session {
         self
     }
 
-    /// The same session on a plant that is changed like this; the controller does not know.
-    pub fn with_plant(mut self, change: impl FnOnce(&mut VirtualRig)) -> Self {
-        change(&mut self.plant);
+    /// The same session on a plant, or read by sensors, changed like this; the controller does not know.
+    pub fn with_plant(mut self, change: impl FnOnce(&mut VirtualRig, &mut Sensors)) -> Self {
+        change(&mut self.plant, &mut self.sensors);
         self
-    }
-
-    /// The same read by these sensors.
-    pub fn with_sensors(self, sensors: Sensors) -> Self {
-        Self { sensors, ..self }
     }
 
     /// Reads the sensors: the latest code of each at the present tick. Once a tick,

@@ -131,7 +131,7 @@ fn driven(
     let sensors = Sensors::new(plant.sensors.clone(), noise);
     let rig = VirtualRig::new(plant, 0.0, 0.0, TICK_S);
     let session = Session::new(&scenario, Options::default()).expect("a sound scenario");
-    let mut session = session.with_plant(|plant| *plant = rig).with_sensors(sensors);
+    let mut session = session.with_plant(|plant, own| (*plant, *own) = (rig, sensors));
     let (mut reader, mut samples) = (Reader::new(&scenario), Vec::new());
     let mut start = Some(Command::Start);
     while samples.len() < LONGEST
