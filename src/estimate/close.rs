@@ -7,8 +7,7 @@ use crate::numeric::sqrt;
 use crate::sense::SensedState;
 use crate::units::{Direction, Millimetres, Q16, q16};
 
-/// Deviation of a step's height from which it is reported, mm: three steps of the angle code, and
-/// the tolerance of a sleeve, 0.05.
+/// Deviation of a step's height that is reported, mm: three of the angle's codes, and a sleeve's 0.05.
 const HEIGHT_SEEN: Millimetres = q16(120_000);
 
 impl Estimator {
@@ -89,11 +88,10 @@ impl Estimator {
                 let known = open.landing.filter(|landing| landing.slid > Q16::ZERO);
                 let more = |last: &Landing| known.is_none_or(|known| last.slid > known.slid);
                 let landing = open.slide.landing().filter(more).inspect(|last| {
-                    let [slid, lost] =
-                        known.map_or([Q16::ZERO; 2], |known| [known.slid, known.lost]);
-                    open.slip.lost += last.slid - slid;
+                    let before = known.unwrap_or_default();
+                    open.slip.lost += last.slid - before.slid;
                     open.landing = Some(*last);
-                    state.odometry.slip(last.lost - lost, Q16::ZERO);
+                    state.odometry.slip(last.lost - before.lost, Q16::ZERO);
                     state.begin_tick(sensed.travel);
                 });
                 let landing = landing.or(known);
@@ -120,6 +118,9 @@ impl Estimator {
                 };
                 if let Some(landing) = landing.filter(|landing| landing.slid > Q16::ZERO) {
                     state.odometry.slip(Q16::ZERO, landing.sigma());
+                    if higher > HEIGHT_SEEN {
+                        open.slip.lost -= open.slide.early(measured.height, higher, landing.slid);
+                    }
                 }
                 if higher.abs() > HEIGHT_SEEN {
                     // The height moves the face, and is read on a wall that is not there.

@@ -326,9 +326,9 @@ impl Estimator {
             Direction::Deploy => self.steps.height - rise,
             Direction::Retract => rise,
         } + seen.compression;
-        let lag = (sensed.speed.value * FILTER_LAG).widen();
-        let travel = sensed.travel.saturating_sub(lag);
-        let at = OnEdge { travel, position, fall, depth: seen.compression };
+        let travel = sensed.travel.saturating_sub((sensed.speed.value * FILTER_LAG).widen());
+        let gave = state.wind_up.gave();
+        let at = OnEdge { travel, position, fall, depth: seen.compression, gave };
         let on_floor = state.watch.contact == Contact::Both;
         // Of a crossing that began in its middle the wall below was not measured.
         let Some(open) = state.crossing.as_mut().filter(|open| !open.turned) else { return };
@@ -351,11 +351,10 @@ impl Estimator {
             }
             return;
         }
-        let radius = self.watch.radius;
         let lost = match state.direction {
-            Direction::Deploy => open.slip.step(radius, &at, on_floor),
+            Direction::Deploy => open.slip.step(self.watch.radius, &at, on_floor),
             Direction::Retract => {
-                let Some(landing) = open.slide.step(radius, &at) else { return };
+                let Some(landing) = open.slide.step(self.watch.radius, &at) else { return };
                 open.landing = Some(landing);
                 open.slip.lost += landing.slid;
                 landing.lost

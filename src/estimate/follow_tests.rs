@@ -180,7 +180,7 @@ fn a_slide_behind_what_looked_like_the_end_of_one_is_counted_once() {
     // The face moves outwards by 0.9 mm while the tread stands.
     for fall in [2_000_000, 2_300_000] {
         let (travel, depth) = (Travel::ZERO, q16(900_000));
-        let at = OnEdge { travel, position: face, fall: q16(fall), depth };
+        let at = OnEdge { travel, position: face, fall: q16(fall), depth, gave: travel };
         let _ = open.slide.step(estimator.watch.radius, &at);
     }
     let all = open.slide.landing().expect("a landing").slid;

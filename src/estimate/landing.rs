@@ -14,8 +14,7 @@ use crate::units::{Millimetres, Q16, Ratio, Travel, q16};
 /// Part of the tread's travel by which the face must move for a slide, or for a wall that carries: a sensor
 /// of the mean, creep and coupled rubber move it by a tenth. Without a derivation between that and 0.5.
 const MOVES: Ratio = q16(250_000);
-/// Least slide by the largest compression, mm: what the arm's code makes of an edge's place, three
-/// deviations.
+/// Least slide by the largest compression, mm: three deviations of an edge's place by the arm's code.
 const SHOWN: Millimetres = q16(90_000);
 /// Least slide in all, mm: two sigma of what it is off by, with the reading's own.
 const SLID: Millimetres = q16(300_000);
@@ -30,12 +29,11 @@ const GOES_ON: Ratio = q16(600_000);
 /// sensor of the mean makes of a creeping wheel on virtual rigs, without a derivation.
 const ROLLS: Ratio = q16(3_000_000);
 /// Motion of the face in a tick that is none of a slide, mm: 5 mm/s. A wheel that slides is out of balance,
-/// faster after 0.1 mm at 0.13 m/s2; a tread that relaxes beside a slow wheel is slower. A slide shows if
-/// it goes 0.15 mm beyond it: one of 0.3 mm at 10 mm/s, of 1 mm at 6.
+/// faster after 0.1 mm at 0.13 m/s2; a tread that relaxes beside a slow wheel is slower.
 const SINKS: Millimetres = q16(5_000);
 
 /// A wheel on the edge.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct OnEdge {
     /// Travel of the tread when the arm was there.
     pub travel: Travel,
@@ -45,6 +43,8 @@ pub struct OnEdge {
     pub fall: Millimetres,
     /// Compression, mm.
     pub depth: Millimetres,
+    /// What the tread has given way by, outwards, as its model has it.
+    pub gave: Travel,
 }
 
 impl OnEdge {
@@ -56,14 +56,13 @@ impl OnEdge {
 }
 
 /// A retracting wheel as the lower wall took it.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Landing {
     /// Position of the face by the edge, before any slide or where the wheel lands, mm.
     pub face: Millimetres,
     /// How far the wheel slides in all, mm; 0 if it rolls.
     pub slid: Millimetres,
-    /// By how much it is further in than its position has it, mm: a climb that no tread made
-    /// counted as one.
+    /// By how much it is further in than its position has it, mm: a climb without a turn counted as one.
     pub lost: Millimetres,
 }
 
@@ -76,12 +75,13 @@ impl Landing {
 }
 
 /// Where a tick has the face over the axial travel, mm.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Face {
     by_largest: Millimetres,
     as_read: Millimetres,
     /// Axial travel by the tread since the edge was first seen, mm.
     travelled: Millimetres,
+    at: OnEdge,
     /// Its position by the compression as read, mm.
     position: Millimetres,
     /// As read, less what [`MOVES`] or [`SINKS`] explain: least where a slide begins, mm.
@@ -120,10 +120,7 @@ impl Slide {
     pub fn step(&mut self, radius: Millimetres, at: &OnEdge) -> Option<Landing> {
         self.deepest = self.deepest.max(at.depth);
         let over = radius - at.fall;
-        let edge = |depth: Millimetres| {
-            let reach = radius - depth;
-            sqrt((reach * reach - over * over).max(Q16::ZERO))
-        };
+        let edge = |depth: Millimetres| OnEdge { depth, ..*at }.ahead(radius);
         let turned = self.travel.map_or(Travel::ZERO, |travel| travel.saturating_sub(at.travel));
         let turned = Q16::narrow(turned) * divide(over, radius - at.depth).min(Ratio::ONE);
         self.travelled += turned;
@@ -139,6 +136,7 @@ impl Slide {
             by_largest: edge(self.deepest) - self.travelled,
             as_read,
             travelled: self.travelled,
+            at: *at,
             position: at.position + edge(at.depth),
             beyond: of_slide,
         };
@@ -164,7 +162,6 @@ impl Slide {
         let (begin, end) = self.found?;
         let by_largest = end.by_largest - begin.by_largest;
         let as_read = end.as_read - begin.as_read;
-        let face = begin.position;
         let less = (by_largest - as_read) * BY_LARGEST;
         let on = (as_read + less) * GOES_ON;
         let slid = as_read + less + on;
@@ -172,13 +169,23 @@ impl Slide {
         let more = as_read - (end.travelled - begin.travelled) * ROLLS;
         let fast = more.min(SLID.half()) <= self.beyond;
         let shown = by_largest > SHOWN && slid >= self.beyond && fast;
-        let lost = if shown { end.position - face + less + on } else { self.beyond };
+        let lost = if shown { end.position - begin.position + less + on } else { self.beyond };
         let slid = if shown { slid } else { self.beyond };
         if slid <= SLID {
             let face = end.position + end.by_largest - end.as_read;
             return Some(Landing { face, slid: Q16::ZERO, lost: Q16::ZERO });
         }
-        Some(Landing { face, slid, lost })
+        Some(Landing { face: begin.position, slid, lost })
+    }
+
+    /// What is none of a slide onto a wall that lies `lower` than its table, at this fall, mm: the model of
+    /// the tread unwinds it where the table has the wall, and what it does too early looks like a slide.
+    pub fn early(&self, fall: Millimetres, lower: Millimetres, slid: Millimetres) -> Millimetres {
+        let Some((begin, end)) = self.found else { return Q16::ZERO };
+        let unwound = Q16::narrow(begin.at.gave.saturating_sub(end.at.gave));
+        let early = unwound * divide(lower, (end.at.fall + lower - fall).max(lower));
+        let early = early + early * GOES_ON;
+        if slid - early > SLID { early } else { slid }
     }
 }
 
@@ -217,6 +224,7 @@ mod tests {
                 position: Q16::from_num(18.0 - 6.3 - tread),
                 fall: Q16::from_num(fall + jitter),
                 depth: Q16::from_num(depth * mean),
+                gave: Travel::ZERO,
             };
             found = found.or(slide.step(Q16::from_num(R), &at));
             if since > 1.5 {
@@ -247,6 +255,7 @@ mod tests {
                 position: Q16::from_num(18.0 - 6.3 - rolled),
                 fall: Q16::from_num(fall - off),
                 depth: Q16::from_num(1.4),
+                gave: Travel::ZERO,
             };
             landings.extend(slide.step(Q16::from_num(R), &at));
         }
@@ -276,6 +285,7 @@ mod tests {
                 position: Q16::from_num(18.0 - 6.3 - tread),
                 fall: Q16::from_num(fall),
                 depth: Q16::from_num(depth.max(0.3) + jitter),
+                gave: Travel::ZERO,
             };
             found = found.or(slide.step(Q16::from_num(R), &at));
             let slides = past >= 11.0 && past < 11.0 + slid;
@@ -283,6 +293,22 @@ mod tests {
             tread += 0.002;
         }
         found.or(slide.landing())
+    }
+
+    #[test]
+    fn what_the_model_unwinds_before_the_wall_is_there_is_no_slide() {
+        let at =
+            |fall, gave| OnEdge { fall: q16(fall), gave: q16(gave).widen(), ..OnEdge::default() };
+        let face = |at| Face { at, ..Face::default() };
+        // The table has the wall 0.4 mm above the end, and it lies 0.3 mm lower.
+        let found = Some((face(at(4_100_000, 500_000)), face(at(4_400_000, 300_000))));
+        let slide = Slide { found, ..Slide::default() };
+        let left = |slid: f64| {
+            let slid = Q16::from_num(slid);
+            (slid - slide.early(q16(4_300_000), q16(300_000), slid)).to_num::<f64>()
+        };
+        assert!((left(0.6) - (0.6 - 1.6 * 0.15)).abs() < 1e-3, "{}", left(0.6));
+        assert_eq!(left(0.5), 0.0);
     }
 
     /// Distance past the face at which the wheel of [`land`] has fallen so far.

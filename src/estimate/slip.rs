@@ -14,8 +14,8 @@ use super::landing::OnEdge;
 use crate::numeric::{divide, sqrt};
 use crate::units::{Millimetres, Q16, Ratio, Travel, q16};
 
-/// Part of the axial travel by which the face moves on a wheel that grips, at most: creep 0.05 at 0.99
-/// of the friction (`plant.elastic_creep` of 0.01), and the rolling radius 0.02.
+/// Part of the axial travel by which the face moves on a wheel that grips, at most: creep 0.05 close
+/// to the limit of friction, and the rolling radius 0.02.
 const CREEPS: Ratio = q16(70_000);
 /// Part of the compression as read that a sensor misses, at most: one of the mean over a patch of
 /// parabolic depth reads two thirds.
@@ -31,7 +31,6 @@ const SHOWS_WITHIN: Travel = q16(400_000).widen();
 const SHOWN: Millimetres = Q16::from_bits(3 * HEIGHT_MOST.to_bits());
 /// Largest motion of the face in a tick, mm. More is a sensor that errs.
 const MOST: Millimetres = q16(800_000);
-
 /// Part of a slip that is one sigma of it: what the reference lets pass 10 mm before the face, 0.27 of
 /// the travel and [`CREEPS`], evenly spread.
 const PART_SIGMA: Ratio = q16(200_000);
@@ -81,7 +80,6 @@ impl CornerSlip {
         let turned = self.last.map_or(Travel::ZERO, |last| at.travel.saturating_sub(last.travel));
         self.rolled += Q16::narrow(turned) * along;
         let face = self.rolled + ahead;
-        let slope = divide(over, ahead);
         let misread = divide(over * HEIGHT_MOST + reach * at.depth * MISSED, ahead);
         let beyond = face - misread - self.rolled * CREEPS;
         let now = Seen { travel: at.travel, face, beyond };
@@ -90,7 +88,7 @@ impl CornerSlip {
             (self.mark, self.outermost, self.slipping) = (now, face, false);
             return Q16::ZERO;
         }
-        let noise = slope * NOISE;
+        let noise = divide(over, ahead) * NOISE;
         let bound = if self.slipping { Q16::ZERO } else { noise };
         let rise = beyond - self.mark.beyond;
         // What the largest misreading leaves of it, or all.
@@ -135,8 +133,7 @@ impl CornerSlip {
     /// off by has one cause, so that in all it is [`Self::sigma`].
     pub(super) fn sigma_of(&self, lost: Millimetres) -> Millimetres {
         let now = self.sigma();
-        let begins = lost >= self.lost;
-        let before = if begins { Q16::ZERO } else { now - lost * PART_SIGMA };
+        let before = if lost >= self.lost { Q16::ZERO } else { now - lost * PART_SIGMA };
         sqrt((now - before) * (now + before))
     }
 }
@@ -165,6 +162,7 @@ mod tests {
                 position: Q16::ZERO,
                 fall: Q16::from_num(R - over + error + jitter - missed * DEPTH),
                 depth: Q16::from_num((1.0 - missed) * DEPTH),
+                gave: Travel::ZERO,
             };
             if at_edge.ahead(Q16::from_num(R)) > Q16::from_num(0.25 * R) {
                 taken += watch.step(Q16::from_num(R), &at_edge, false).to_num::<f64>();
@@ -228,7 +226,7 @@ mod tests {
                 let fall = Q16::from_num(R - (reach * reach - ahead * ahead).sqrt());
                 let (travel, position) = (Travel::ZERO, Q16::ZERO);
                 let depth = Q16::from_num(DEPTH);
-                let at = OnEdge { travel, position, fall, depth };
+                let at = OnEdge { travel, position, fall, depth, gave: Travel::ZERO };
                 watch.step(Q16::from_num(R), &at, false).to_num::<f64>()
             })
             .sum();

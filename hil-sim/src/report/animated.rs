@@ -125,7 +125,6 @@ stroke-width=\"1.5\" d=\"M0 {top}V{bottom}\">{at}</path></g>",
     Some(format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{0}\" height=\"{1}\" viewBox=\"0 0 {0} {1}\" \
 font-family=\"sans-serif\" fill=\"#1f2937\">\n<title>A crossing of a simulated run, {SLOWER} times slower: {2}</title>\n\
-<style>.data path {{ vector-effect: non-scaling-stroke; }}</style>\n\
 <rect width=\"{0}\" height=\"{1}\" fill=\"white\"/>\n<svg {WHEEL}>\n<g id=\"crossing\">\n\
 <g>{moved}<g>{turned}<circle r=\"{r}\" fill=\"#59616d\"/><circle r=\"{hub}\" fill=\"#e3e7ec\"/>\
 <path d=\"M-17 0H17M0 -17V17\" stroke=\"#5b6472\" stroke-width=\"0.4\"/></g></g>\n\

@@ -193,7 +193,7 @@ data-least=\"{least}\"{}>\n<figcaption><b>{}</b><output></output>{legend}</figca
             also.unwrap_or_default(),
             escape(&self.title),
             escape(name),
-            self.plot((f64::from(wide), f64::from(high)), plot::LEFT),
+            self.plot((f64::from(wide), f64::from(high)), plot::LEFT, true),
         )
     }
 

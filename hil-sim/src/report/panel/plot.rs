@@ -51,7 +51,7 @@ impl Panel {
     }
 
     /// Axes, names and data in a picture of this size with so much `left` of the plot, user units.
-    pub(super) fn plot(&self, (wide, high): (f64, f64), left: f64) -> String {
+    pub(super) fn plot(&self, (wide, high): (f64, f64), left: f64, own_units: bool) -> String {
         let (x, y) = (self.x, self.y_range());
         let (top, bottom, end) = (self.above(), high - self.below(), wide - RIGHT);
         let (across, down) = (end - left, bottom - top);
@@ -77,6 +77,8 @@ impl Panel {
                 axes += &(grid(format!("M{left} {at:.1}H{end}")) + &label);
             }
         }
+        // The page's script moves data that are in their own units.
+        let to = if own_units { [x, y] } else { [(0.0, across), (0.0, down)] };
         let (middle, centre) = (left + 0.5 * across, top + 0.5 * down);
         if !self.x_name.is_empty() {
             names += &text((middle, bottom + 33.0), "middle", " class=\"across\"", &self.x_name);
@@ -100,11 +102,11 @@ height=\"{down}\" viewBox=\"{} {} {} {}\" preserveAspectRatio=\"none\">\n\
 <path class=\"axis\" fill=\"none\" stroke=\"{}\" d=\"M{left} {top}V{bottom:.1}H{end:.1}\"/>\n\
 <g class=\"labels\">\n{labels}</g></g>\n",
             palette::TEXT,
-            x.0,
-            -y.1,
-            x.1 - x.0,
-            y.1 - y.0,
-            self.data(across),
+            to[0].0,
+            -to[1].1,
+            to[0].1 - to[0].0,
+            to[1].1 - to[1].0,
+            self.data(across, to),
             palette::AXIS,
         )
     }
@@ -144,9 +146,11 @@ height=\"{down}\" viewBox=\"{} {} {} {}\" preserveAspectRatio=\"none\">\n\
         rules(faults).chain(spans).chain(rules(limits)).filter_map(place).collect()
     }
 
-    /// Everything with a place on both axes, in their units, for a plot that is `across` user units wide.
-    fn data(&self, across: f64) -> String {
+    /// Everything with a place on both axes, `to` these ends, for a plot `across` user units wide.
+    fn data(&self, across: f64, to: [(f64, f64); 2]) -> String {
         let (x, y) = (self.x, self.y_range());
+        let x_at = |v: f64| digits(to[0].0 + (v - x.0) / (x.1 - x.0) * (to[0].1 - to[0].0), to[0]);
+        let y_at = |v: f64| digits(to[1].0 + (v - y.0) / (y.1 - y.0) * (to[1].1 - to[1].0), to[1]);
         // Beyond both ends, so that it reaches them after every zoom.
         let (tall, long) = (10.0 * (y.1 - y.0), 10.0 * (x.1 - x.0));
         let path = |class: &str, name: &str, stroke: &str, d: &str| {
@@ -155,8 +159,9 @@ height=\"{down}\" viewBox=\"{} {} {} {}\" preserveAspectRatio=\"none\">\n\
         };
         let mut svg = String::new();
         let mut rect = |class, fill, span: (f64, f64), (low, high): (f64, f64), name: &str| {
-            let (from, wide) = (digits(span.0, x), digits(span.1 - span.0, x).max(0.0));
-            let (name, low, high) = (escape(name), digits(low, y), digits(high - low, y));
+            let (from, wide) = (x_at(span.0), digits(x_at(span.1) - x_at(span.0), to[0]).max(0.0));
+            let (name, low) = (escape(name), y_at(low));
+            let high = digits(y_at(high) - low, to[1]);
             svg += &format!(
                 "<rect class=\"{class}\" data-name=\"{name}\" fill=\"{fill}\" x=\"{from}\" \
 y=\"{low}\" width=\"{wide}\" height=\"{high}\"/>\n"
@@ -169,15 +174,15 @@ y=\"{low}\" width=\"{wide}\" height=\"{high}\"/>\n"
             rect("band", *colour, *x, *y, name);
         }
         for &(name, look, level) in &self.levels {
-            let d = format!("M{} {level}H{}", x.0 - long, x.1 + long);
+            let d = format!("M{} {}H{}", x_at(x.0 - long), y_at(level), x_at(x.1 + long));
             svg += &path("level", name, &look.stroke(), &d);
         }
         for rule in &self.rules {
-            let d = format!("M{} {}V{}", digits(rule.x, x), y.0 - tall, y.1 + tall);
+            let d = format!("M{} {}V{}", x_at(rule.x), y_at(y.0 - tall), y_at(y.1 + tall));
             let class = if rule.is_fault() { "rule fault" } else { "rule" };
             svg += &path(class, &rule.name, &stroke(rule.colour, 1.5), &d);
         }
-        let point = |&(a, b): &(f64, f64)| format!("{} {}", digits(a, x), digits(b, y));
+        let point = |&(a, b): &(f64, f64)| format!("{} {}", x_at(a), y_at(b));
         let mut lines: Vec<&Line> = self.lines.iter().collect();
         lines.sort_by_key(|line| line.look.style().0);
         for Line { name, look, points } in lines {
@@ -185,13 +190,9 @@ y=\"{low}\" width=\"{wide}\" height=\"{high}\"/>\n"
             let pieces = decimate(points, x, (across / 2.0).max(1.0) as usize);
             let piece = |piece: Vec<(f64, f64)>| {
                 // Of a level stretch both ends.
-                let same = |a: usize, b: usize| {
-                    piece
-                        .get(a)
-                        .zip(piece.get(b))
-                        .is_some_and(|(a, b)| digits(a.1, y) == digits(b.1, y))
-                };
-                let kept = |i: &usize| *i == 0 || !(same(i - 1, *i) && same(*i, i + 1));
+                let level = |i: usize| piece.get(i).map(|point| y_at(point.1));
+                let inside = |i: usize| level(i - 1) == level(i) && level(i) == level(i + 1);
+                let kept = |i: &usize| *i == 0 || !inside(*i);
                 let kept = (0..piece.len()).filter(kept).map(|i| point(&piece[i]));
                 format!("M{}", kept.collect::<Vec<_>>().join(" "))
             };

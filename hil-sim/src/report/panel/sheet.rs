@@ -39,7 +39,8 @@ pub fn sheet(mut panels: Vec<Panel>, columns: usize, is_shared: bool) -> String 
         let head = heads.iter().map(|head| head.1).fold(0.0, f64::max);
         let around = row.iter().map(|one| one.above() + one.below()).fold(0.0, f64::max);
         for (place, (panel, (title, _))) in row.iter().zip(heads).enumerate() {
-            let plot = panel.plot((wide, panel.above() + PLOT + panel.below()), left);
+            let high = panel.above() + PLOT + panel.below();
+            let plot = panel.plot((wide, high), left, false);
             let across = place as f64 * wide;
             let _ = write!(
                 svg,
@@ -51,7 +52,6 @@ pub fn sheet(mut panels: Vec<Panel>, columns: usize, is_shared: bool) -> String 
     }
     format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{}\" height=\"{}\" viewBox=\"0 0 {WIDE} {down}\">\n\
-<style>path {{ vector-effect: non-scaling-stroke; }}</style>\n\
 <rect width=\"{WIDE}\" height=\"{down}\" fill=\"white\"/>\n{svg}</svg>\n",
         ZOOM * WIDE,
         ZOOM * down,
@@ -63,7 +63,7 @@ impl Panel {
     /// bottom; user units.
     pub(in crate::report) fn alone(&self, high: f64) -> (String, [f64; 4]) {
         let (head, taken) = self.head(WIDE, &self.legend());
-        let plot = self.plot((WIDE, high - taken), LEFT);
+        let plot = self.plot((WIDE, high - taken), LEFT, false);
         let svg = format!("{head}<g transform=\"translate(0 {taken})\">\n{plot}</g>\n");
         (svg, [LEFT, WIDE - RIGHT, taken + self.above(), high - self.below()])
     }
