@@ -247,7 +247,7 @@ mod tests {
         // Upwards is more: the inner picture is turned over, as its range is.
         assert!(html.contains("<g transform=\"scale(1 -1)\""), "{html}");
         assert!(html.contains("data-x=\"10 20\" data-y=\"1 5\""), "{html}");
-        assert!(sheet(vec![panel], 1, false).contains("d=\"M10 1M20 5\""));
+        assert!(sheet(vec![panel], 1, false).contains("d=\"M0 0M468.8 156\""));
     }
 
     #[test]
