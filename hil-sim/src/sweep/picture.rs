@@ -74,6 +74,6 @@ mod tests {
         };
         let plot = Plot { column: "duration_s", title: "Duration", y_name: "duration, s" };
         let svg = picture(&[axis], &[row(1, false), row(2, true), row(3, false)], &[plot]).unwrap();
-        assert!(svg.contains("d=\"M2 2h0\"") && !svg.contains("M1 1"), "{svg}");
+        assert!(svg.contains("d=\"M220 78h0\""), "{svg}");
     }
 }

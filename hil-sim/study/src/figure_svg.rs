@@ -118,12 +118,13 @@ mod tests {
         assert!(lines.contains("stroke-dasharray=\"8 4\"") && !lines.contains("h0M"));
         let names = ("x", vec!["first".to_owned(), "second".to_owned()]);
         let marks = drawn(Chart::of_categories("t", names, "y", all()));
-        assert!(marks.contains(">second</text>") && marks.contains("d=\"M-0.1 2h0M0.9 2.5h0\""));
+        let at = "d=\"M90.9 78h0M318.1 112.82h0\"";
+        assert!(marks.contains(">second</text>") && marks.contains(at), "{marks}");
         // The legend has no line where there is none.
         assert!(!marks.contains("stroke-dasharray"), "{marks}");
         assert_eq!(marks.matches(palette::RANGE).count(), 2 + 1, "a range each, and their sample");
         let points = vec![(0.1, 1e-3), (1.0, 0.0), (10.0, 0.1)];
         let chart = Chart::new("t", "x", "y", vec![Series::method(0, "a", points)]).logarithmic();
-        assert!(drawn(chart).contains("d=\"M-1 -3 1 -1\""));
+        assert!(drawn(chart).contains("d=\"M12.5 8.36 427.5 147.64\""));
     }
 }
