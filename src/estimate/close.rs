@@ -118,8 +118,8 @@ impl Estimator {
                 };
                 if let Some(landing) = landing.filter(|landing| landing.slid > Q16::ZERO) {
                     state.odometry.slip(Q16::ZERO, landing.sigma());
-                    if higher > HEIGHT_SEEN {
-                        open.slip.lost -= open.slide.early(measured.height, higher, landing.slid);
+                    if higher > HEIGHT_SEEN && open.slide.may_unwind(landing.slid) {
+                        open.slip.lost -= landing.slid;
                     }
                 }
                 if higher.abs() > HEIGHT_SEEN {
