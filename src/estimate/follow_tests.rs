@@ -169,8 +169,9 @@ fn a_step_that_slides_put_out_of_place_leaves_the_place_unsure() {
     }
 }
 
-#[test]
-fn a_slide_behind_what_looked_like_the_end_of_one_is_counted_once() {
+/// A slide of over 0.9 mm, part of which was seen before, onto a wall so much lower than its table, while
+/// the model of the tread unwinds it by so much, millionths of a millimetre; and what is named of it.
+fn slid(lower: i64, unwound: i64) -> (Millimetres, Option<Millimetres>) {
     let (sensed, estimator) = (sensed(0, 0.0, 0.3), estimator());
     let face = estimator.steps.face(1).expect("a first step");
     let seen = Landing { face, slid: q16(330_000), lost: q16(300_000) };
@@ -178,9 +179,9 @@ fn a_slide_behind_what_looked_like_the_end_of_one_is_counted_once() {
     let mut open = OpenCrossing { step: 1, landing: Some(seen), lift, ..OpenCrossing::default() };
     open.slip.lost = seen.slid;
     // The face moves outwards by 0.9 mm while the tread stands.
-    for fall in [2_000_000, 2_300_000] {
-        let (travel, depth) = (Travel::ZERO, q16(900_000));
-        let at = OnEdge { travel, position: face, fall: q16(fall), depth, gave: travel };
+    for (fall, gave) in [(2_000_000, unwound), (2_300_000, 0)] {
+        let (travel, depth, gave) = (Travel::ZERO, q16(900_000), q16(gave).widen());
+        let at = OnEdge { travel, position: face, fall: q16(fall), depth, gave };
         let _ = open.slide.step(estimator.watch.radius, &at);
     }
     let all = open.slide.landing().expect("a landing").slid;
@@ -188,6 +189,23 @@ fn a_slide_behind_what_looked_like_the_end_of_one_is_counted_once() {
     let (direction, crossing) = (Direction::Retract, Some(open));
     let mut state = EstimateState { direction, crossing, ..EstimateState::default() };
     let mut found = Findings::default();
-    estimator.close(&mut state, &sensed, &estimator.as_table(Q16::ZERO), &mut found);
-    assert_eq!(found.slip.expect("a slip").amount, all);
+    let mut measured = estimator.as_table(Q16::ZERO);
+    measured.height += q16(lower);
+    estimator.close(&mut state, &sensed, &measured, &mut found);
+    (all, found.slip.map(|slip| slip.amount))
+}
+
+#[test]
+fn a_slide_behind_what_looked_like_the_end_of_one_is_counted_once() {
+    let (all, named) = slid(0, 0);
+    assert_eq!(named, Some(all));
+}
+
+#[test]
+fn a_slide_that_the_model_unwinds_is_none_on_a_lower_wall_alone() {
+    assert_eq!(slid(300_000, 1_000_000).1, None);
+    for (lower, unwound) in [(0, 1_000_000), (100_000, 1_000_000), (300_000, 0)] {
+        let (all, named) = slid(lower, unwound);
+        assert_eq!(named, Some(all), "{lower} {unwound}");
+    }
 }
