@@ -5,7 +5,6 @@
 
 mod close;
 pub mod crossing;
-mod crossing_speed;
 mod follow;
 mod landing;
 pub mod odometry;

@@ -165,7 +165,7 @@ impl Controller {
         output.request = None;
         output.rearm = false;
         output.events.clear();
-        let acceleration = state.acceleration();
+        let acceleration = state.outwards(state.profile.acceleration());
         let mut sensed =
             self.senses.step(&mut state.senses, input.now, &input.sensors, acceleration);
         state.estimate.rim(&mut sensed, matches!(state.mode, Mode::Run(..)));
@@ -202,7 +202,7 @@ impl Controller {
             travel: state.estimate.driven(tick.sensed),
             wound: state.estimate.wound(),
             bridges: input.sensors.bridges,
-            speed_ref: state.signed_speed(),
+            speed_ref: state.outwards(state.profile.speed()),
             preload_due: state.preload_loop.due(),
             effort: steady.then(|| state.speed_loop.value()),
             overrun: input.overrun,

@@ -125,7 +125,6 @@ fn a_stop_brings_the_drive_to_rest_and_keeps_the_preload() {
         let after = |what: &str| format!("{what} after {name}");
         bench.until(&after("rest"), 0.3, |now| now.truth.rigid_mm_s.abs() < 0.5);
         bench.until(&after("idle"), 0.1, |now| now.seen.mode == Mode::Idle);
-        // The worm brakes the remaining speed.
         bench.until(&after("standstill"), 0.025, Moment::is_still);
         let (from, sinks_mm) = (bench.now().clone(), sinks_mm(&case.scenario));
         let moments = bench.moments.len();
@@ -134,9 +133,11 @@ fn a_stop_brings_the_drive_to_rest_and_keeps_the_preload() {
             assert!(now.is_off() && now.is_still(), "{name}");
             let sunk = from.truth.position_mm - now.truth.position_mm;
             assert!((-0.05..sinks_mm).contains(&sunk), "{name}: {sunk}");
-            // The tread relaxes into the wall, or sinks down the corner, and takes some spring with it.
-            let kept = now.truth.preload_n / from.truth.preload_n;
-            assert!((0.98..1.001).contains(&kept), "{name}: {kept}");
+            // The tread sinks in or down, by less than its depth, and takes some spring with it.
+            let rises = now.truth.radius_mm - from.truth.radius_mm;
+            let spring_n = case.scenario.rig.preload.spring_n_per_mm * rises;
+            let off = (now.truth.preload_n + spring_n) / from.truth.preload_n - 1.0;
+            assert!(rises < from.truth.depth_mm && off.abs() < 0.002, "{name}: {rises} {off}");
         }
         let off = |now: &Moment| now.seen.position.to_num::<f64>() - now.truth.position_mm;
         let lost = off(bench.now()) - off(&from);
@@ -171,8 +172,7 @@ fn assert_three_crossings(bench: &Bench, scenario: &Scenario, name: &str) {
     assert_eq!(recorded, order, "{name}");
     for record in bench.records() {
         assert_eq!(record.direction, direction.into(), "{name}");
-        let residual = record.residual.to_num::<f64>();
-        assert!(residual.abs() < 0.5, "{name} step {}: {residual}", record.index);
+        assert!(record.residual.to_num::<f64>().abs() < 0.5, "{name}: {record:?}");
     }
     for crossing in bench.crossings() {
         // A tread that has rested on the corner is softer: less gap, hardly ever more.
@@ -222,12 +222,10 @@ fn a_run_stopped_while_the_preload_builds_starts_again() {
 /// reference.
 fn assert_sound_records(bench: &Bench, scenario: &Scenario, name: &str) {
     for record in bench.records() {
-        let residual = record.residual.to_num::<f64>();
-        assert!(residual.abs() < 0.5, "{name}: {record:?}");
+        assert!(record.residual.to_num::<f64>().abs() < 0.5, "{name}: {record:?}");
         let measured = record.gap_measured.to_num::<f64>();
         let truth = bench.true_gap_mm(&record);
-        // At the study's loads a wheel that is turned back on the corner just after touch-down
-        // leaves the lower wall at 19 mm/s: 1.07.
+        // At the study's loads one that is turned back just after touch-down leaves at 19 mm/s: 1.07.
         let (most, off) = if name.starts_with("fe") { (1.08, 0.06) } else { (1.05, 0.03) };
         let part = truth.unwrap_or(measured) / gap_ref(scenario, record.direction);
         assert!((0.65..most).contains(&part), "{name}: {part} {record:?}");
@@ -243,8 +241,9 @@ fn a_run_turned_back_anywhere_returns() {
         let home = opposite(scenario.run.direction);
         let mut bench = stopped(case);
         bench.go(home);
-        // The one step that is left behind that place may not bear out where it is under these loads.
-        let alone = name.starts_with("fe retract FirstHalf");
+        // One step that is left may not bear out where the wheel is under these loads.
+        let on_second = !matches!(case.place, Place::Cruise | Place::Settle);
+        let alone = name.starts_with("fe retract") && on_second;
         if !alone || bench.mode() != Mode::FaultHold(Fault::PlaceUnconfirmed) {
             assert_arrived(&bench, scenario, home, name);
         }

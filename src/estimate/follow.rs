@@ -4,15 +4,13 @@ use super::close::{Measured, slip_of};
 use super::crossing::{Contact, CrossingEvent, Lift, WatchInput};
 use super::landing::OnEdge;
 use super::odometry::Rolling;
-use super::slip::MISSED;
 use super::tread::Rolls;
 use super::wind_up::Pulled;
 use super::{EstimateState, Estimator, Expectation, Findings, LiftPoint, OpenCrossing, Position};
 use crate::fault::{Fault, Limit};
 use crate::model::LimitedBy;
-use crate::numeric::divide;
 use crate::sense::{FILTER_LAG, SensedState};
-use crate::units::{Direction, Millimetres, Newtons, Q16, Ratio, Tick};
+use crate::units::{Direction, Millimetres, Newtons, Q16, Ratio, Tick, q16};
 
 /// Ticks for which a wheel may slip under the most preload that there is: five times those in which
 /// the published tread relaxes.
@@ -39,6 +37,8 @@ pub struct Follow<'a> {
     pub limited_by: Option<LimitedBy>,
 }
 
+/// Part of the load by which a compression falls that may be read low.
+const MISSED: Ratio = q16(666_667);
 /// Age of a reading of the arm from which it counts as silent: at a reading each tick, two missing.
 const SILENT_TICKS: u32 = 2;
 
@@ -52,7 +52,6 @@ impl Estimator {
     pub fn begin_tick(&self, state: &mut EstimateState, sensed: &SensedState) {
         state.begin_tick(sensed.travel);
         self.memory.step(&mut state.remembered, sensed.preload_filtered);
-        state.crossing_speed.step(sensed.speed.value);
     }
 
     /// One tick in which the drive moves.
@@ -115,30 +114,15 @@ impl Estimator {
     /// What pulls at the tread, and where.
     fn pulled(&self, state: &EstimateState, tick: &Follow<'_>) -> Pulled {
         let seen = self.watch_input(state, tick.sensed);
-        let ahead = match &state.crossing {
-            Some(open) => {
-                let face = open.lift.map(|point| point.face).or(open.felt);
-                face.or(self.steps.face(open.step)).map(|face| face - state.position)
-            }
-            // A wheel that goes over an edge is on it before that shows.
-            None if state.direction == Direction::Retract && !state.known.is_searching() => {
-                let over = self.distance(state).map(|distance| -distance);
-                over.filter(|over| self.watch.may_be_over(&state.watch, &seen, *over))
-            }
-            None => None,
-        };
-        let ahead = ahead.unwrap_or_default().max(Q16::ZERO);
-        let off = state.watch.contact == Contact::Wall && ahead > Q16::ZERO;
-        // Too far for an edge, on a step that is not as high as the table has it.
         let on_corner = matches!(state.watch.contact, Contact::Both | Contact::Corner);
+        let ahead = self.edge(state, &seen).map(|face| face - state.position);
+        // Too far for an edge, on a step that is not as high as the table has it.
         let most = self.corner().first_contact(Direction::Deploy);
-        let beyond = ahead > most && !on_corner;
-        let ahead = if beyond { Q16::ZERO } else { ahead.min(most) };
-        let over = state.watch.contact == Contact::Leaving && ahead == Q16::ZERO;
-        let drops = on_corner && !beyond && state.direction == Direction::Retract;
-        let floor = if off {
-            Q16::ZERO
-        } else if beyond || over {
+        let beyond = ahead.is_some_and(|ahead| ahead > most) && !on_corner;
+        let ahead = ahead.filter(|_| !beyond).map_or(Q16::MIN, |ahead| ahead.min(most));
+        let drops = on_corner && state.direction == Direction::Retract;
+        let over = state.watch.contact == Contact::Leaving && ahead <= Q16::ZERO;
+        let floor = if beyond || over {
             seen.compression
         } else {
             self.watch.floor(&state.watch, state.direction, &seen)
@@ -152,9 +136,26 @@ impl Estimator {
             depth: seen.compression,
             ahead,
             floor,
-            // A compression read low falls faster than the load.
-            lost: if drops { divide(state.watch.eased, Ratio::ONE + MISSED) } else { Q16::ZERO },
+            below: state.watch.contact != Contact::Wall && !over,
+            lost: if drops { state.watch.eased * MISSED } else { Q16::ZERO },
             level: far && self.watch.is_level(&state.watch, state.direction, &seen),
+        }
+    }
+
+    /// Face of the step whose edge may be under the wheel, mm.
+    fn edge(&self, state: &EstimateState, seen: &WatchInput) -> Option<Millimetres> {
+        if let Some(open) = &state.crossing {
+            let face = open.lift.map(|point| point.face).or(open.felt);
+            return face.or(self.steps.face(open.step));
+        }
+        match state.direction {
+            Direction::Deploy => state.leaving.filter(|face| *face <= state.position),
+            // A wheel that goes over an edge is on it before that shows.
+            Direction::Retract => {
+                let over = -self.distance(state)?;
+                let may = self.watch.may_be_over(&state.watch, seen, over.max(Q16::ZERO));
+                may.then(|| state.position + over)
+            }
         }
     }
 
@@ -405,7 +406,7 @@ impl Estimator {
             gap_as_table: lift.gap,
             history: *state.history.history(),
             distance: lift.distance,
-            speed: state.crossing_speed.speed(FILTER_LAG, sensed.speed.value),
+            speed: state.history.history().speed(self.stride),
             held: sensed.speed.value,
             preload: sensed.preload_filtered,
             remembered: state.remembered_preload(),

@@ -19,7 +19,7 @@ use crate::units::{Millimetres, Q16, Ratio, Travel, q16};
 const CREEPS: Ratio = q16(70_000);
 /// Part of the compression as read that a sensor misses, at most: one of the mean over a patch of
 /// parabolic depth reads two thirds.
-pub(super) const MISSED: Ratio = q16(500_000);
+const MISSED: Ratio = q16(500_000);
 /// Rise of the centre that is noise, mm: three steps of the angle code.
 const NOISE: Millimetres = q16(120_000);
 /// Travel of the tread within which a slip of half of it shows beyond the noise, mm: 0.12 times the

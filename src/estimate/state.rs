@@ -1,7 +1,6 @@
 //! What the estimator remembers between ticks, and what it reports of one.
 
 use super::crossing::{Contact, WatchState};
-use super::crossing_speed::CrossingSpeed;
 use super::landing::{Landing, Slide};
 use super::odometry::Odometry;
 use super::tread::{Shown, TreadState};
@@ -37,7 +36,6 @@ pub struct EstimateState {
     /// Preload behind the memory of the tread, N.
     pub(super) remembered: LowPassState,
     /// Speed behind it.
-    pub(super) crossing_speed: CrossingSpeed,
     /// Direction of the run.
     pub direction: Direction,
     /// Level by steps detected.
@@ -317,14 +315,6 @@ impl EstimateState {
         let followed = self.crossing.is_some();
         if self.known.is_searching() && !followed { Contact::Wall } else { self.watch.contact }
     }
-
-    /// Distance outwards from `at` to the face of a step that the table lacks, while the wheel
-    /// is on it, mm.
-    pub fn extra_face(&self, at: Millimetres) -> Option<Millimetres> {
-        let crossing = self.crossing.as_ref().filter(|crossing| crossing.step == 0)?;
-        let face = crossing.lift.as_ref()?.face;
-        (face > at).then_some(face - at)
-    }
 }
 
 #[cfg(test)]
@@ -355,19 +345,5 @@ mod tests {
             let record = Some(Place { position: Q16::ZERO, sure, zeros: Default::default() });
             assert_eq!(EstimateState::restored(record).confidence(), confidence);
         }
-    }
-
-    #[test]
-    fn a_step_that_the_table_lacks_is_ahead_until_its_face() {
-        let lifted = |step: u8| {
-            let lift = LiftPoint { face: q16(30_000_000), ..LiftPoint::default() };
-            let open = OpenCrossing { step, lift: Some(lift), ..OpenCrossing::default() };
-            EstimateState { crossing: Some(open), ..EstimateState::default() }
-        };
-        let unknown = lifted(0);
-        assert_eq!(unknown.extra_face(q16(25_000_000)), Some(q16(5_000_000)));
-        assert_eq!(unknown.extra_face(q16(30_000_000)), None);
-        assert_eq!(lifted(1).extra_face(q16(25_000_000)), None);
-        assert_eq!(EstimateState::default().extra_face(q16(25_000_000)), None);
     }
 }

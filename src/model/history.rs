@@ -2,7 +2,10 @@
 
 #![deny(clippy::float_arithmetic)]
 
-use crate::units::{Direction, Millimetres, Newtons, Q16, Travel};
+use crate::numeric::divide;
+use crate::units::{
+    Direction, Millimetres, MillimetresPerSecond, Newtons, Q16, Travel, ticks_to_seconds,
+};
 
 /// Strides kept: on the published wheel 9.6 mm of tread, more than a patch before lift-off.
 pub const STRIDES: usize = 48;
@@ -75,6 +78,12 @@ impl History {
         self.strides.iter().copied().filter(|stride| stride.code > 0)
     }
 
+    /// Mean speed over the last 0.6 mm of tread, in which it does most of its relaxing, mm/s.
+    pub fn speed(&self, stride: Millimetres) -> MillimetresPerSecond {
+        let ticks: u32 = self.strides.iter().rev().take(3).map(|stride| stride.ticks()).sum();
+        divide(stride + stride + stride, ticks_to_seconds(ticks.max(1)))
+    }
+
     /// Adds a stride, in place of the oldest.
     pub fn push(&mut self, stride: HistoryStride) {
         self.strides.rotate_left(1);
@@ -135,6 +144,7 @@ mod tests {
             assert!((18..=20).contains(&writer.history().strides().count()));
             assert!(writer.history().strides().skip(1).all(|s| (19..=21).contains(&s.ticks())));
             assert!(writer.history().strides().all(|s| s.pressed() == q16(40_500_000)));
+            assert!((writer.history().speed(stride) - q16(10_000_000)).abs() < q16(500_000));
             roll(&mut writer, 4000, &mut travel);
             assert_eq!(writer.history().strides().count(), STRIDES);
             for _ in 0..=STANDS {

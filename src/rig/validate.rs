@@ -237,7 +237,7 @@ impl Rig {
             ("preload.lag_s", self.preload.lag_s, 0.005, 1.0),
             ("drive.no_load_speed_mm_s", self.drive.no_load_speed_mm_s, 5.0, 300.0),
             ("drive.stall_force_n", self.drive.stall_force_n, 5.0, 5000.0),
-            ("drive.force_limit_n", self.drive.force_limit_n, 5.0, 400.0),
+            ("drive.force_limit_n", self.drive.force_limit_n, 5.0, 250.0),
             ("drive.reflected_mass_kg", self.drive.reflected_mass_kg, 0.1, 1000.0),
             ("drive.cruise_speed_mm_s", self.drive.cruise_speed_mm_s, 3.0, 100.0),
             ("drive.min_crossing_speed_mm_s", self.drive.min_crossing_speed_mm_s, 0.5, 20.0),

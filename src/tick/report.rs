@@ -125,7 +125,7 @@ impl Controller {
             position: state.estimate.position,
             position_sigma: if is_sure { self.estimator.sigma(&state.estimate) } else { Q16::MAX },
             speed: tick.sensed.speed.value,
-            speed_ref: state.signed_speed(),
+            speed_ref: state.outwards(state.profile.speed()),
             preload: tick.sensed.preload.value,
             preload_ref: targets.preload,
             compression: tick.sensed.compression.value,

@@ -11,9 +11,7 @@ use crate::model::{Learned, Plan, Review};
 use crate::sense::{SensesState, Zeros};
 use crate::supervise::service::ServiceState;
 use crate::supervise::{Leg, Mode, MonitorState};
-use crate::units::{
-    Direction, Millimetres, MillimetresPerSecond, MillimetresPerSecond2, Newtons, Q16, Ratio, Tick,
-};
+use crate::units::{Direction, Millimetres, Newtons, Q16, Ratio, Tick, Travel};
 
 /// Ticks over which the feed-forward of a detected corner is blended in.
 const BLEND_TICKS: u8 = 32;
@@ -39,6 +37,8 @@ pub struct State {
     pub(super) service: ServiceState,
     /// Ticks for which a corner has been detected, up to [`BLEND_TICKS`].
     pub(super) corner_blend_ticks: u8,
+    /// Where a wheel that brakes is by its profile, mm.
+    pub(super) braked: Option<Travel>,
 }
 
 /// The approach to the step ahead; it begins again with the next step and with each run.
@@ -110,18 +110,8 @@ impl State {
         self.planning.learned.scale
     }
 
-    /// Speed reference, signed outwards.
-    pub(super) fn signed_speed(&self) -> MillimetresPerSecond {
-        self.outwards(self.profile.speed())
-    }
-
-    /// Acceleration reference, signed outwards.
-    pub(super) fn acceleration(&self) -> MillimetresPerSecond2 {
-        self.outwards(self.profile.acceleration())
-    }
-
     /// What is along the run, signed outwards.
-    fn outwards(&self, along: Q16) -> Q16 {
+    pub(super) fn outwards(&self, along: Q16) -> Q16 {
         if self.estimate.direction == Direction::Deploy { along } else { -along }
     }
 

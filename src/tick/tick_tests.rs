@@ -146,7 +146,7 @@ fn the_duty_shows_the_load_only_at_a_steady_speed() {
             let (speed_loop, wanted) = (&mut state.speed_loop, Q16::from_num(20));
             controller.speed_loop.step(speed_loop, wanted, Q16::ZERO, Q16::ZERO);
         }
-        let speed = state.signed_speed();
+        let speed = state.outwards(state.profile.speed());
         let mut sensed = answering();
         sensed.speed.value = speed;
         (0..300).find_map(|now| {

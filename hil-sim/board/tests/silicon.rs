@@ -72,7 +72,8 @@ fn a_stack_that_overflows_ends_at_the_protection_whatever_lies_below_ram() {
     // So close to its end that an exception's frame crosses it; and beyond by a push.
     for left in [16, 0] {
         let mut board = Board::moving();
-        // Between two ticks the core sleeps, and nothing is popped first.
+        // Between two ticks the core sleeps, once it has planned, and nothing is popped first.
+        let _ = (0..200).map(|_| board.step()).count();
         let machine = board.machine();
         machine.run_on(machine.now() + HZ / 2500).expect("runs");
         let end = board.bench.machine.image.symbol("_stack_end").expect("a symbol");

@@ -3,7 +3,7 @@
 use super::wall::Step;
 
 /// Travel of the axle over which the speed before lift-off counts, mm. The controller's
-/// `estimate::crossing_speed` has the same for the tread, which is what it can measure.
+/// `model::history` has the same for the tread, which is what it can measure.
 pub const REMEMBERED_MM: f64 = 0.5;
 
 /// What is looked at every ring step.

@@ -115,8 +115,8 @@ fn assert_safe(got: &Outcome, scenario: &Scenario, part: f64, name: &str) {
 fn assert_found(got: &Outcome, name: &str) {
     for line in &got.summary.crossings {
         let off = line.step_found_mm.expect("reported") - line.step_mm;
-        // Three sigma of a place that no step near it has confirmed.
-        assert!(off.abs() < 0.65, "{name}, step at {}: {off}", line.step_mm);
+        // Three sigma of where a step is found, 0.245 mm.
+        assert!(off.abs() < 0.735, "{name}, step at {}: {off}", line.step_mm);
     }
 }
 
