@@ -192,7 +192,7 @@ impl Controller {
         // Only detected corners are fed forward: the table may be wrong. The feed-forward is
         // blended in, or the drive would jump.
         let (blend, added) = state.blend_corner();
-        let wanted = state.outwards(state.profile.speed()) + self.behind(state, targets.speed);
+        let wanted = state.outwards(state.profile.speed()) + self.to_profile(state, targets.speed);
         let (climb, drift) = match blend {
             Q16::ZERO => (Q16::ZERO, Q16::ZERO),
             _ => self.corner(state, tick, targets.speed),
@@ -210,16 +210,16 @@ impl Controller {
     }
 
     /// Speed that brings a wheel which brakes to rest back to where its profile has it, mm/s outwards.
-    fn behind(&self, state: &mut State, target: MillimetresPerSecond) -> MillimetresPerSecond {
+    fn to_profile(&self, state: &mut State, target: MillimetresPerSecond) -> MillimetresPerSecond {
         let (position, speed) =
             (state.estimate.position.widen(), state.outwards(state.profile.speed()));
         let brakes = target == Q16::ZERO && speed != Q16::ZERO;
         if !brakes || !matches!(state.mode, Mode::Run(..)) {
-            state.braked = None;
+            state.brake_position = None;
             return Q16::ZERO;
         }
-        let planned = state.braked.unwrap_or(position).saturating_add(per_tick(speed));
-        state.braked = Some(planned);
+        let planned = state.brake_position.unwrap_or(position).saturating_add(per_tick(speed));
+        state.brake_position = Some(planned);
         Q16::narrow(planned.saturating_sub(position)).clamp(-MOST_BEHIND, MOST_BEHIND) * CLOSES
     }
 

@@ -38,7 +38,7 @@ pub struct State {
     /// Ticks for which a corner has been detected, up to [`BLEND_TICKS`].
     pub(super) corner_blend_ticks: u8,
     /// Where a wheel that brakes is by its profile, mm.
-    pub(super) braked: Option<Travel>,
+    pub(super) brake_position: Option<Travel>,
 }
 
 /// The approach to the step ahead; it begins again with the next step and with each run.
