@@ -148,15 +148,13 @@ impl Estimator {
             let face = open.lift.map(|point| point.face).or(open.felt);
             return face.or(self.steps.face(open.step));
         }
-        match state.direction {
-            Direction::Deploy => state.leaving.filter(|face| *face <= state.position),
-            // A wheel that goes over an edge is on it before that shows.
-            Direction::Retract => {
-                let over = -self.distance(state)?;
-                let may = self.watch.may_be_over(&state.watch, seen, over.max(Q16::ZERO));
-                may.then(|| state.position + over)
-            }
+        if state.direction == Direction::Deploy {
+            return state.leaving.filter(|face| *face <= state.position);
         }
+        // A wheel that goes over an edge is on it before that shows.
+        let over = -self.distance(state)?;
+        let may = self.watch.may_be_over(&state.watch, seen, over.max(Q16::ZERO));
+        may.then(|| state.position + over)
     }
 
     /// Where the step is, from the moment at which its corner carries.

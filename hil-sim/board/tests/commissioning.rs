@@ -2,8 +2,10 @@
 //! parameters to the board, three deployments and the ways back, identification, its parameters to
 //! the board, acceptance. The rig is drawn far beyond its tolerances; the truth judges.
 
+use std::f64::consts::TAU;
 use std::fs::File;
 use std::path::Path;
+use std::thread;
 
 use hil_sim::bringup::{self, Line, Progress, Stdin};
 use hil_sim::identify::accept::accept;
@@ -23,7 +25,10 @@ use crate::common::{Board, elf, strings};
 /// A rig of this seed, and what is known of it.
 fn hidden(seed: u64) -> Scenario {
     let wide = include_str!("../../tests/identify/hidden.toml");
-    Scenario::parse("hidden.toml", wide, &[format!("run.seed={seed}")]).expect("a scenario")
+    // The compliance along the wall by 0.7 to 1.4, in step with the seed.
+    let compliance = 0.7 * 2f64.powf((seed % 20) as f64 / 19.0);
+    let sets = [format!("run.seed={seed}"), format!("mismatch.wind_up_compliance={compliance}")];
+    Scenario::parse("hidden.toml", wide, &sets).expect("a scenario")
 }
 
 /// A board whose plant this is, idle.
@@ -112,11 +117,12 @@ const CHANGES: [Change; 5] = [
     ("second step 1 mm off", |p| p.wall = p.wall.moved(&[0.0, 1.0, 0.0])),
 ];
 
-/// First of the seeds; of these 9, 13 and 16 have tuned the fit since.
-const FIRST: u64 = 2_100_001;
+/// First of the seeds.
+const FIRST: u64 = 7_100_001;
 
-/// Commissions the rig of a seed: keys outside their interval, and why it fails, if it does.
-fn commission(seed: u64) -> (Vec<String>, Vec<String>) {
+/// Commissions the rig of a seed: keys outside their interval, why it is not accepted, and after which
+/// of the changes it still is.
+fn commission(seed: u64, changes: &[Change]) -> [Vec<String>; 3] {
     let hidden = hidden(seed);
     let folder = tempfile::tempdir().expect("a folder");
     let folder = folder.path();
@@ -129,7 +135,7 @@ fn commission(seed: u64) -> (Vec<String>, Vec<String>) {
     bringup::run(&mut line, &mut person, &mut progress, &mut |_| (), &mut |_| ()).expect("ends");
     let failed: Vec<_> = progress.checks().filter(|check| !check.ok).collect();
     if !failed.is_empty() {
-        return (Vec::new(), vec![format!("{failed:?}")]);
+        return [Vec::new(), vec![format!("{failed:?}")], Vec::new()];
     }
     let mut mine = progress.proposed;
     assert_eq!(mine.sources.len(), 3, "{:?}", mine.sources);
@@ -147,50 +153,65 @@ fn commission(seed: u64) -> (Vec<String>, Vec<String>) {
     // Identification.
     let found = match identify(&records, &records[0].scenario) {
         Ok(found) => found,
-        Err(error) => return (Vec::new(), vec![error.to_string()]),
+        Err(error) => return [Vec::new(), vec![error.to_string()], Vec::new()],
     };
     let mine = found.scenario.clone();
     let mut missed = Vec::new();
     let plant = hidden.plant();
-    for (name, truth) in [
+    let zero = plant.sensors.angle_zero_rad / TAU;
+    let mut truths: Vec<(String, f64)> = [
         ("tread.k_inf_pa_per_m", 1e9 * plant.ring.k_inf),
         ("tread.stiffening", plant.ring.k_0 / plant.ring.k_inf),
         ("tread.tau_s", plant.ring.tau_s),
         ("plant.mu", plant.mu),
         ("plant.top_load_n", plant.load_n / mine.rig.plant.top_load_share),
         ("drive.no_load_speed_mm_s", plant.drive.no_load_mm_s),
+        ("sense.angle_zero_code", plant.sensors.angle_zero_code + 16_384.0 * zero),
+        ("preload.delay_s", plant.delay_s),
+        ("preload.lag_s", plant.lag_s),
         ("preload.slew_n_per_s", plant.slew_n_per_s),
         ("preload.spring_n_per_mm", plant.spring_n_per_mm),
-    ] {
-        let of = found.parameter(name).expect(name);
+    ]
+    .map(|(name, truth)| (name.to_owned(), truth))
+    .into();
+    for (step, of) in (1..).zip(plant.wall.steps()) {
+        truths.push((format!("rig.step_positions_mm[{step}]"), of.position_mm));
+        truths.push((format!("rig.step_height_mm[{step}]"), of.height_mm));
+    }
+    for (name, truth) in truths {
+        let of = found.parameter(&name).expect("a parameter of each key");
         let (low, high) = (of.low.unwrap_or(f64::MIN), of.high.unwrap_or(f64::MAX));
         if !of.identified || !(low..=high).contains(&truth) {
             missed.push(format!("{name}: {truth} is not in {low} to {high}"));
         }
     }
     // Acceptance, and not of another rig.
-    let mut wrong = refused(&mut at, &mine, folder);
-    let (change, by) = CHANGES[(seed % 5) as usize];
-    let mut plant = plant;
-    by(&mut plant);
-    if refused(&mut board(&hidden, Some(plant)), &mine, folder).is_empty() {
-        wrong.push(format!("{change}: accepted"));
-    }
-    (missed, wrong)
+    let refusal = refused(&mut at, &mine, folder);
+    let accepted = changes.iter().filter(|(_, change)| {
+        let mut plant = plant.clone();
+        change(&mut plant);
+        refused(&mut board(&hidden, Some(plant)), &mine, folder).is_empty()
+    });
+    [missed, refusal, accepted.map(|(change, _)| (*change).to_owned()).collect()]
 }
 
+/// Of 20 rigs 19 are within the intervals with every key, 19 are accepted, and none that has changed.
 #[test]
 fn unknown_rigs_are_commissioned_and_accepted() {
-    let rigs = if long() { 20 } else { 1 };
-    let (mut missed, mut failed) = (Vec::new(), Vec::new());
-    for seed in FIRST..FIRST + rigs {
-        let (outside, wrong) = commission(seed);
-        eprintln!("seed {seed}: {outside:?} {wrong:?}");
-        missed.extend(outside);
-        failed.extend((!wrong.is_empty()).then_some((seed, wrong)));
-    }
-    // Short of 19 of 20 rigs: a way back often seems another rig's than the way out, and what the
-    // second and third run show of the spring is off by 1 %, which its interval does not say.
-    assert!(4 * failed.len() as u64 <= rigs, "{failed:#?}");
-    assert!(5 * missed.len() as u64 <= 7 * rigs, "{missed:#?}");
+    let (rigs, changes) = if long() { (20, &CHANGES[..]) } else { (1, &CHANGES[1..2]) };
+    let every_second = |first: u64| {
+        let seeds = (FIRST + first..FIRST + rigs).step_by(2);
+        seeds.map(|seed| (seed, commission(seed, changes))).collect::<Vec<_>>()
+    };
+    let found = thread::scope(|scope| {
+        [0, 1].map(|first| scope.spawn(move || every_second(first))).map(|half| half.join())
+    });
+    let found: Vec<_> = found.into_iter().flat_map(|half| half.expect("a verdict")).collect();
+    println!("{found:#?}");
+    let few = |of: usize| {
+        let rigs = found.iter().filter(|(_, told)| !told[of].is_empty()).count();
+        20 * rigs <= found.len()
+    };
+    assert!(few(0) && few(1), "{found:#?}");
+    assert!(found.iter().all(|(_, told)| told[2].is_empty()), "{found:#?}");
 }

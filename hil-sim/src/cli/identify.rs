@@ -14,7 +14,7 @@ use crate::table::{number, plain, width, wrapped};
 use crate::{files, progress};
 use clap::builder::PossibleValuesParser;
 
-/// Identifies a rig's parameters from its logs, with 95 % intervals.
+/// Identifies a rig's parameters from its logs, each with an interval; all hold in 19 of 20 rigs.
 ///
 /// Several logs of one rig give narrower intervals: a scheduled deployment and two at constant
 /// preloads, one light, one heavy; logs of several rigs are refused. Writes a scenario file with what was identified and a
@@ -127,7 +127,7 @@ fn human(found: &Identification) -> String {
         let width = p.high.zip(p.low).map_or(0.0, |(high, low)| high - low);
         vec![p.name.clone(), p.unit.to_owned(), figures(p.value, width), p.interval(), p.by.clone()]
     });
-    let table = plain(&["parameter", "unit", "value", "95 % interval", "identified by"], rows);
+    let table = plain(&["parameter", "unit", "value", "interval", "identified by"], rows);
     let mut text = format!("{} degrees of freedom\n{table}\n\n", found.degrees_of_freedom);
     let rows = found.residuals.iter().map(|left| {
         vec![

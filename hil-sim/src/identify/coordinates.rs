@@ -44,8 +44,10 @@ const UNKNOWN_HEIGHT_MM: f64 = 0.5;
 const DRIVE_REL: f64 = 0.01;
 const NO_LOAD_REL: f64 = 0.025;
 /// What the model itself is off by, one sigma, logarithm: the root mean square error on the hidden
-/// rigs of seeds 1 to 10, friction's mostly low, as the jitter of the drive's load raises the creep.
-pub(crate) const OFF: [(usize, f64); 2] = [(CREEP, 0.005), (FRICTION, 0.012)];
+/// rigs of seeds 50,001 to 50,016 that their scatter does not explain. Relaxation and friction are mostly
+/// low, the load high: the forward model is up to 2 um off at a climb.
+pub(crate) const OFF: [(usize, f64); 4] =
+    [(CREEP, 0.005), (FRICTION, 0.012), (TAU, 0.010), (LOAD, 0.008)];
 /// Of the compliance along the wall, logarithm: compound and hub make it 0.7 to 1.4 times as much,
 /// evenly.
 const COMPLIANCE_LN: f64 = 0.2;

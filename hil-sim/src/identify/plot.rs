@@ -1,10 +1,13 @@
 //! Plots the residuals of a log, a row per channel, with the 95 % band of a normal
 //! distribution with their root mean square.
 
-use super::result::{NORMAL_95, Residuals};
+use super::result::Residuals;
 use crate::report::axis::{extent, padded};
 use crate::report::palette;
 use crate::report::panel::{Look, Marks, Panel, Shape, sheet};
+
+/// Half-width of the band, standard deviations.
+const NORMAL_95: f64 = 1.96;
 
 pub fn svg(rows: &[&Residuals]) -> String {
     let times = rows.iter().flat_map(|row| row.series.iter().map(|(t, _)| *t));

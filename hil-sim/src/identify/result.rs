@@ -17,8 +17,9 @@ use super::record::Record;
 use super::traces::Zero;
 use crate::scenario::Scenario;
 
-/// Half-width of a 95 % interval in standard deviations.
-pub(crate) const NORMAL_95: f64 = 1.96;
+/// Half-width of an interval in standard deviations: of a rig's 26 values all are within theirs with 95 %,
+/// each with 0.998 (Bonferroni).
+const WITHIN: f64 = 3.1;
 /// Part of the prior deviation that the logs must leave for a parameter to count as
 /// identified: where nothing was known, and where a tolerance was.
 const LEAVES: (f64, f64) = (0.1, 0.5);
@@ -27,7 +28,7 @@ const TICK_VARIANCE: f64 = 1.0 / 12.0;
 /// Evidence of a parameter that has none.
 const NOTHING: &str = "not in these logs";
 
-/// A parameter with its 95 % interval.
+/// A parameter with its interval: a rig's values are all within theirs with 95 %.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Parameter {
     /// Its key in a scenario, or its name where a scenario has none.
@@ -206,7 +207,7 @@ impl Document<'_> {
         // A bridge cuts some pulses short, at full duty none: the drive's as the pre-tightener's.
         let cut = if index == NO_LOAD { self.lost } else { 0.0 };
         let deviation = self.contact.covariance[(index, index)].sqrt().hypot(cut);
-        let ends = [of(x - NORMAL_95 * deviation), of(x + NORMAL_95 * deviation)];
+        let ends = [of(x - WITHIN * deviation), of(x + WITHIN * deviation)];
         let leaves = if prior.tolerance { LEAVES.1 } else { LEAVES.0 };
         let identified = deviation < leaves * prior.deviation;
         let by = match (identified, prior.tolerance) {
@@ -230,7 +231,7 @@ impl Document<'_> {
             // The logs determine the turn; the position depends on the radius as well.
             let (value, variance) =
                 self.coordinates.place(step, &self.contact.x, &self.contact.covariance);
-            let half = NORMAL_95 * variance.sqrt();
+            let half = WITHIN * variance.sqrt();
             let (low, high) = (Some(value - half), Some(value + half));
             list.push(Parameter { value, low, high, ..turned });
         }
@@ -254,7 +255,7 @@ impl Document<'_> {
             Parameter::new(name, unit, value, Some([low, high]), identified, by)
         };
         let around = |name: &str, unit, value: f64, deviation: f64| {
-            let half = NORMAL_95 * deviation;
+            let half = WITHIN * deviation;
             of(name, unit, value, [value - half, value + half])
         };
         let scaled = |name: &str, unit, index: usize| {
@@ -264,7 +265,7 @@ impl Document<'_> {
         };
         let delay = (variance(actuator::DELAY) + TICK_VARIANCE).sqrt();
         let (lag, deviation) = (x[actuator::LAG], variance(actuator::LAG).sqrt());
-        let lag = [lag, lag - NORMAL_95 * deviation, lag + NORMAL_95 * deviation].map(f64::exp);
+        let lag = [lag, lag - WITHIN * deviation, lag + WITHIN * deviation].map(f64::exp);
         vec![
             around("preload.delay_s", "s", 1e-3 * x[actuator::DELAY], 1e-3 * delay),
             of("preload.lag_s", "s", lag[0], [lag[1], lag[2]]),
@@ -284,7 +285,7 @@ impl Document<'_> {
             let value: f64 = zeros.iter().map(|zero| part(zero) * zero.value).sum();
             let variance: f64 =
                 zeros.iter().map(|zero| (part(zero) * zero.error).powi(2)).sum::<f64>();
-            let half = NORMAL_95 * variance.sqrt();
+            let half = WITHIN * variance.sqrt();
             let interval = (count > 0).then_some([value - half, value + half]);
             let by = interval.map_or(NOTHING, |_| "the unloaded rig");
             Parameter::new(name, unit, value, interval, count > 0, by)
@@ -351,7 +352,7 @@ fn updated(scenario: &Scenario, parameters: &[Parameter], logs: &str) -> Scenari
     found.sources.extend(
         intervals
             .into_iter()
-            .map(|(key, all)| (key.to_owned(), format!("{}, 95 %, by {logs}", all.join("; ")))),
+            .map(|(key, all)| (key.to_owned(), format!("{}, by {logs}", all.join("; ")))),
     );
     found
 }
@@ -430,7 +431,7 @@ mod tests {
         };
         let read = Scenario::parse("identified.toml", &found.to_toml(), &[]).unwrap();
         assert_eq!(read, after);
-        assert_eq!(read.sources["tread.tau_s"], "0.10 to 0.30, 95 %, by a log");
+        assert_eq!(read.sources["tread.tau_s"], "0.10 to 0.30, by a log");
         assert!(!read.assumed().contains(&"tread.tau_s".to_owned()) && read.assumed().len() > 9);
     }
 }

@@ -35,8 +35,8 @@ const EXPERIMENTS: [(&str, ControllerKind, f64); 3] = [
 pub(crate) struct Line {
     /// Rigs whose logs determine it.
     pub(crate) identified: usize,
-    /// Of these, rigs whose interval holds the hidden value.
-    pub(crate) within: usize,
+    /// Seeds of those whose interval does not hold the hidden value.
+    pub(crate) outside: Vec<u64>,
     /// Largest error over the hidden value.
     pub(crate) worst_rel: f64,
     /// Half-widths of the intervals.
@@ -63,7 +63,7 @@ pub(crate) fn found(seed: u64, mut book: impl FnMut(&str, &dyn Fn(&mut Line))) {
         if parameter.identified {
             book(&name, &|line| {
                 line.identified += 1;
-                line.within += usize::from((low..=high).contains(&truth));
+                line.outside.extend((!(low..=high).contains(&truth)).then_some(seed));
                 line.worst_rel = line.worst_rel.max((parameter.value / truth - 1.0).abs());
                 line.half_widths.push(0.5 * (high - low));
             });

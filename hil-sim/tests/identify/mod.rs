@@ -3,7 +3,7 @@
 
 mod hidden;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::cli::{code, good_in, object, refused_in, rig_in, stderr};
 use hidden::Line;
@@ -12,24 +12,19 @@ use hil_sim::scenario::Scenario;
 use hil_sim::testing::long;
 
 #[test]
-fn hidden_parameters_lie_within_their_intervals() {
+fn all_hidden_parameters_of_19_rigs_of_20_lie_within_their_intervals() {
     let cases = if long() { 100 } else { 2 };
     let mut lines = BTreeMap::<String, Line>::new();
-    // The intervals were widened by the rigs of seeds 1 to 10.
     for seed in 11..=10 + cases {
         hidden::found(seed, |name, of| of(lines.entry(name.to_owned()).or_default()));
     }
     assert_eq!(lines.len(), 19);
-    let (mut within, mut all) = (0, 0);
     for (name, line) in &lines {
         // Two of a hundred rigs have a run that does not start.
         assert!(line.identified + cases as usize / 20 >= cases as usize, "{name}: {line:?}");
-        // Of two at 95 % one that is outside tells nothing.
-        assert!(!long() || 10 * line.within >= 7 * line.identified, "{name}: {line:?}");
-        within += line.within;
-        all += line.identified;
     }
-    assert!(10 * within >= 9 * all, "{within} of {all}: {lines:#?}");
+    let outside: BTreeSet<u64> = lines.values().flat_map(|line| line.outside.clone()).collect();
+    assert!(20 * outside.len() as u64 <= cases, "{outside:?}: {lines:#?}");
     let tread = Scenario::default().rig.tread;
     for (name, value) in [
         ("tread.k_inf_pa_per_m", tread.k_inf_pa_per_m),
