@@ -51,7 +51,6 @@ pub struct Cost {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct WithWaits {
     pub mean: f64,
-    /// Most.
     pub worst: u64,
 }
 
@@ -87,7 +86,6 @@ pub struct Gathered {
 }
 
 impl Gathered {
-    /// Counting begins.
     pub fn begin(&mut self, machine: &mut Machine) {
         machine.profile.take_polls();
         *self = Self {

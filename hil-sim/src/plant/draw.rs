@@ -29,7 +29,6 @@ pub struct PlantParameters {
     pub ring: RingParameters,
     /// The steps as machined.
     pub wall: Wall,
-    /// Arm.
     pub arm: Arm,
     /// Radius of the outermost wall, mm.
     pub wall_radius_mm: f64,
@@ -45,9 +44,7 @@ pub struct PlantParameters {
     pub rolling_compression: f64,
     /// Axial load on this wheel, N.
     pub load_n: f64,
-    /// Moved mass, kg.
     pub mass_kg: f64,
-    /// Drive motor.
     pub drive: DriveMotor,
     /// Rate of the preload spring, N/mm.
     pub spring_n_per_mm: f64,
@@ -61,11 +58,9 @@ pub struct PlantParameters {
     pub screw_droop: f64,
     /// Part of full duty that the screw's friction takes.
     pub screw_friction: f64,
-    /// Preload limit, N.
     pub preload_limit_n: f64,
     /// Largest force of the screw's position, N.
     pub seat_max_n: f64,
-    /// Modes of the arm.
     pub modes: Vec<ModeParameters>,
     /// Torque ripple: amplitude, N, and its pitch at the tread, mm.
     pub ripple: (f64, f64),

@@ -6,7 +6,6 @@
 pub struct Step {
     /// Axial position of the face, mm.
     pub position_mm: f64,
-    /// Height, mm.
     pub height_mm: f64,
 }
 

@@ -59,7 +59,6 @@ impl<H> Default for Channels<H> {
 }
 
 impl<H> Channels<H> {
-    /// Drops the handle.
     pub fn forget(&mut self) {
         *self = Self::default();
     }

@@ -25,7 +25,6 @@ pub struct Probed<'a> {
 }
 
 impl<'a> Probed<'a> {
-    /// Over this port.
     pub const fn new(port: ReconnectingPort<'a>) -> Self {
         Self { port, letters: VecDeque::new(), news: Vec::new() }
     }

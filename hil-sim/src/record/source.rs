@@ -13,7 +13,6 @@ pub enum SourceError {
     /// The bytes of the input of this name cannot be read.
     #[error("{0}: {1}")]
     Read(String, std::io::Error),
-    /// The run failed.
     #[error(transparent)]
     Run(Box<dyn std::error::Error + Send + Sync>),
     #[error(transparent)]

@@ -7,7 +7,6 @@ use interstage::rig::Rig;
 pub struct RingParameters {
     /// Undeformed radius, mm.
     pub radius_mm: f64,
-    /// Width, mm.
     pub width_mm: f64,
     /// Relaxed stiffness per area, N/mm^3 (1e9 Pa/m).
     pub k_inf: f64,

@@ -36,7 +36,6 @@ pub struct ReferenceCase {
     /// Frictionless ([`Axial::Pushed`], to which the tread is fitted), or driven by
     /// torque against the part of the top load that this wheel lifts.
     pub axial: Axial,
-    /// How finely.
     pub resolution: Resolution,
 }
 
