@@ -50,10 +50,7 @@ pub enum FirmwareError {
     #[error("cargo reported no executable for {0}")]
     NoExecutable(String),
     #[error("could not read {path}: {source}")]
-    Read {
-        path: PathBuf,
-        source: io::Error,
-    },
+    Read { path: PathBuf, source: io::Error },
     #[error("not a firmware image: {0}")]
     Image(String),
 }

@@ -23,24 +23,16 @@ pub use line::Client;
 pub enum StoreError {
     /// A file could not be read, or the emulated board's flash written.
     #[error("{path}: {source}")]
-    File {
-        path: String,
-        source: std::io::Error,
-    },
+    File { path: String, source: std::io::Error },
     #[error(transparent)]
     Write(#[from] FileError),
     /// There is no valid set.
     #[error("{place}: {source}")]
-    Set {
-        place: String,
-        source: SetError,
-    },
+    Set { place: String, source: SetError },
     #[error(transparent)]
     Compile(#[from] CompileError),
     #[error("the board does not answer within {seconds} s")]
-    Silent {
-        seconds: f64,
-    },
+    Silent { seconds: f64 },
     #[error("the board refuses: {0}")]
     Refused(&'static str),
     #[error("the board answered something else than it was asked")]

@@ -60,7 +60,9 @@ pub enum Mark {
     },
     Restart,
     /// A frame of another layout than this reader knows, and its number.
-    Schema { found: u16 },
+    Schema {
+        found: u16,
+    },
 }
 
 impl std::fmt::Display for Mark {
