@@ -19,7 +19,6 @@ const ELSEWHERE: [&str; 3] = ["bench", "modes", "paper"];
 /// nobody to find the sentence that is needed.
 const MOST_WORDS: usize = 15_000;
 
-/// The workspace.
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..").canonicalize().expect("the workspace")
 }

@@ -10,7 +10,6 @@ use hil_sim::session::{Options, run};
 use interstage::fault::Fault;
 use interstage::supervise::{Command, Mode};
 
-/// The outcome of a run.
 #[derive(Debug)]
 struct Outcome {
     summary: Summary,

@@ -34,7 +34,6 @@ struct Forces {
 }
 
 impl Forces {
-    /// Away from the wall, N.
     fn radial_n(&self) -> f64 {
         self.floor_n + self.step_n
     }
