@@ -179,7 +179,6 @@ fn one(scenario: &Scenario, seed: u64) -> Result<RunLine, RunError> {
     }
 }
 
-/// The sentence of a limit's code.
 fn limit_text(code: u16) -> &'static str {
     let known = Limit::ALL.into_iter().find(|limit| limit.code() == code);
     known.map_or("unknown limit", Limit::sentence)

@@ -250,7 +250,6 @@ const OTHERS: [(&str, &[&str]); 3] = [
     ("loops", &["drive_duty", "pretightener_duty"]),
 ];
 
-/// The columns that a stage gives.
 fn given_by(stage: &str) -> impl Iterator<Item = &'static str> {
     let others = OTHERS.into_iter().filter(move |one| one.0 == stage).flat_map(|one| one.1);
     let quantities = Columns::QUANTITIES.iter().filter(move |column| column.stage == stage);

@@ -331,7 +331,6 @@ fn pandas_draws_a_log_alike() {
     assert!(by_pandas.contains("gap") && by_pandas == by_csv);
 }
 
-/// Fields of each topic of a log.
 fn fields(log: &Path) -> BTreeMap<String, Vec<String>> {
     let bytes = fs::read(log).expect("a log");
     let mut topics = BTreeMap::new();

@@ -59,7 +59,6 @@ impl Default for Exceptions {
     }
 }
 
-/// Numbers of the bits that are set.
 fn bits(mut set: u128) -> impl Iterator<Item = u8> {
     std::iter::from_fn(move || {
         let next = set.trailing_zeros();

@@ -120,7 +120,6 @@ impl Image {
         Ok((values, spread))
     }
 
-    /// Name of the function at an address.
     fn name(&self, address: u32) -> &str {
         named(&self.loaded.functions, address)
     }

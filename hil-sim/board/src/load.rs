@@ -66,7 +66,6 @@ pub struct Load {
     pub load_with_waits: Option<f64>,
     /// The control tick with its task.
     pub tick: Cost,
-    /// Bytes of the stack that were used.
     pub stack_used: u32,
     /// Bytes set apart for the stack.
     pub stack: u64,

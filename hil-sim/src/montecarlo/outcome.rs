@@ -90,7 +90,6 @@ pub struct Outcome {
     pub end_off_mm: Option<Quantiles>,
     /// The same over the one sigma that the controller states of its position there.
     pub end_off_sigmas: Option<Quantiles>,
-    /// Distances with which the steps were found.
     pub steps_found: Vec<StepFound>,
     /// Least time by which the preload was reached before a corner touched, s.
     pub lead_time_s: Option<Least>,

@@ -22,7 +22,6 @@ pub const ELEMENTS: usize = 1440;
 /// connector around 80 mm of travel.
 pub const STOP_ROOM_MM: f64 = 2.5;
 
-/// The parameters of one plant.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlantParameters {
     /// Wheel and rubber.
@@ -30,7 +29,6 @@ pub struct PlantParameters {
     /// The steps as machined.
     pub wall: Wall,
     pub arm: Arm,
-    /// Radius of the outermost wall, mm.
     pub wall_radius_mm: f64,
     /// Travel between the end stops, mm.
     pub stops_mm: (f64, f64),

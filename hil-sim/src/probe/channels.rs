@@ -11,7 +11,6 @@ pub enum ChannelError<E> {
     Failed(E),
 }
 
-/// The result of an access.
 pub type Access<T, E> = Result<T, ChannelError<E>>;
 
 impl<E> From<E> for ChannelError<E> {

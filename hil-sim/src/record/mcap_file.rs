@@ -155,7 +155,6 @@ fn level(entry: &Entry) -> u8 {
     }
 }
 
-/// An MCAP file that grows.
 pub(super) struct McapFile<W: Write + Seek> {
     out: mcap::Writer<W>,
     /// Channel and number of messages of each topic.

@@ -215,7 +215,6 @@ pub(super) mod tests {
 
     use crate::record::decoder::tests::frames;
 
-    /// Reads a file of these bytes.
     pub(crate) fn read(bytes: &[u8]) -> Result<Run, ReadError> {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("log");

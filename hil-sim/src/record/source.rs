@@ -33,7 +33,6 @@ pub trait Source {
     }
 }
 
-/// Letter of a command on the console.
 pub const fn letter(command: Command) -> u8 {
     match command {
         Command::Start => b's',
@@ -103,7 +102,6 @@ pub struct Virtual<R> {
 }
 
 impl Virtual<Session> {
-    /// A session of this scenario.
     pub fn new(scenario: &Scenario, attended: bool) -> Result<Self, session::RunError> {
         let session = Session::new(scenario, session::Options::default())?;
         Ok(Self::of(session.logging(), scenario, attended))

@@ -62,7 +62,6 @@ pub struct Report {
     pub text: String,
 }
 
-/// One line of the log as text.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LogLine {
     /// When, s since boot.
@@ -226,7 +225,6 @@ pub struct LedgerLine {
     pub slip_margin: f64,
     /// Travel of the tread beyond the axial travel since the last step found, mm.
     pub slip_mm: f64,
-    /// Slip measured on the corner, mm.
     #[serde(default)]
     pub slip_measured_mm: Option<f64>,
     /// Measured height of the step, mm.

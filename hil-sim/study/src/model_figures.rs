@@ -67,7 +67,6 @@ pub struct RubberFigures {
     pub name: &'static str,
     /// Transit of the tread by the front, ms.
     pub front_ms: f64,
-    /// By slow waves, ms.
     pub slow_ms: f64,
     /// Largest attenuation over the tread, dB.
     pub loss_db: f64,

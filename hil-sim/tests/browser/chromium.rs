@@ -145,7 +145,6 @@ impl Browser {
         self.call("Emulation.setDeviceMetricsOverride", &size);
     }
 
-    /// Chooses medium and colours.
     pub(super) fn media(&mut self, medium: &str, colours: &str) {
         let feature = json!([{ "name": "prefers-color-scheme", "value": colours }]);
         self.call("Emulation.setEmulatedMedia", &json!({ "media": medium, "features": feature }));

@@ -33,7 +33,6 @@ pub(crate) fn scenario(preset: &str, direction: Direction, seed: u64) -> Scenari
     scenario
 }
 
-/// A scenario of a preset with these overrides.
 pub(crate) fn overridden(preset: &str, sets: &[&str]) -> Scenario {
     let sets: Vec<String> = sets.iter().map(|set| (*set).to_owned()).collect();
     Scenario::resolve(Some(preset), None, &sets).expect("a sound scenario")

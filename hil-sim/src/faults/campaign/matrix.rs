@@ -40,7 +40,6 @@ pub struct MatrixRow {
     pub detected: bool,
     /// Worst time from fault to report, ms; none if nothing was reported.
     pub latency_ms: Option<f64>,
-    /// Median of the same, ms.
     pub latency_median_ms: Option<f64>,
     /// From the report to rest with both bridges off, ms.
     pub rest_ms: Option<MedianAndWorst>,

@@ -53,7 +53,6 @@ impl RingParameters {
         self.tread_thickness_mm > 0.0
     }
 
-    /// Whether the rubber relaxes twice.
     pub fn relaxes_twice(&self) -> bool {
         self.second_relaxation > 1.0
     }

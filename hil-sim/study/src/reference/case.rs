@@ -13,7 +13,6 @@ pub struct Resolution {
     pub elements: usize,
     /// Longest axial travel per step, mm.
     pub stride_mm: f64,
-    /// Longest step of time, s.
     pub step_s: f64,
 }
 
