@@ -328,14 +328,4 @@ mod tests {
         assert_eq!(listed.len(), descriptions().len());
         assert!(listed.iter().all(|key| key.description.len() > 4));
     }
-
-    #[test]
-    fn units_come_from_the_end_of_the_name() {
-        assert_eq!(unit("drive.jerk_mm_s3"), "mm/s^3");
-        assert_eq!(unit("tread.tau_s"), "s");
-        assert_eq!(unit("tread.k_inf_pa_per_m"), "Pa/m");
-        assert_eq!(unit("sense.encoder_counts"), "counts");
-        assert_eq!(unit("tread.stiffening"), "");
-        assert_eq!(stem("tau_ms"), stem("tau_s"));
-    }
 }

@@ -6,7 +6,8 @@ use hil_sim::plant::balance::{Axial, Balance, BalanceError};
 use hil_sim::plant::crossing::{CrossingCase, CrossingResult, cross};
 use hil_sim::plant::ring::RingParameters;
 
-/// How finely a crossing is resolved.
+/// How finely a crossing is resolved. How near that is to the converged one, the tests of the
+/// plant's crossing show, which is the same ring.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Resolution {
     /// Elements around the ring.
