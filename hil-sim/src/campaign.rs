@@ -1,6 +1,6 @@
 //! A campaign: many cases, each computed by itself, and what is made of all of them. Each but
 //! `sweep`'s is in a module of its own (as in `montecarlo`); its verb in `cli/` (as `stress.rs`) is in
-//! `cli.rs` a module, a `Verb`, and a line each of `Verb::campaign` and `Verb::run`.
+//! `cli.rs` a module and a row of `verbs!` that names its `campaign`.
 
 mod frame;
 mod shard;
@@ -28,11 +28,9 @@ type Fold<'a, C, L, O> = dyn FnOnce(Vec<(C, L)>) -> O + 'a;
 pub struct Campaign<'a, C, L, O, E> {
     /// What the steps of a case are called, and how many there are at most, each a call of `done`.
     pub steps: (&'static str, usize),
-    /// The cases.
     pub cases: Vec<C>,
     /// Gives the line of a case.
     pub run: Box<Run<'a, C, L, E>>,
-    /// Gives the outcome.
     pub fold: Box<Fold<'a, C, L, O>>,
 }
 

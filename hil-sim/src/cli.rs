@@ -55,37 +55,66 @@ struct Cli {
     verb: Verb,
 }
 
-#[derive(Debug, Subcommand)]
-enum Verb {
-    Deploy(deploy::Args),
-    Accept(accept::Args),
-    Bringup(bringup::Args),
-    Capture(capture::Args),
-    Completions(completions::Args),
-    Live(live::Args),
-    Replay(replay::Args),
-    Report(report::Args),
-    Crossing(crossing::Args),
-    Compare(compare::Args),
-    Envelope(envelope::Args),
-    Montecarlo(montecarlo::Args),
+/// Declares the verbs in the order of their help. A row is a verb with its arguments, what runs it,
+/// and the name of its campaign if it has one: only those rows can be merged.
+macro_rules! verbs {
+    ($($(#[$about:meta])* $verb:ident($args:ty) => $run:expr $(, $campaign:ident)?;)*) => {
+        #[derive(Debug, Subcommand)]
+        enum Verb {
+            $($(#[$about])* $verb($args),)*
+        }
+
+        impl Verb {
+            #[cfg(test)]
+            const CAMPAIGNS: usize = [$($(stringify!($campaign),)?)*].len();
+
+            /// How the verb runs its campaign, if it has one.
+            fn campaign(&mut self) -> Option<&mut CampaignArgs> {
+                match self {
+                    $($(Self::$verb(args) => Some(&mut args.$campaign),)?)*
+                    _ => None,
+                }
+            }
+
+            fn run(&self) -> Result<Outcome, Failure> {
+                match self {
+                    $(Self::$verb(args) => $run(args),)*
+                }
+            }
+        }
+    };
+}
+
+verbs! {
+    Deploy(deploy::Args) => deploy::run;
+    Accept(accept::Args) => accept::run;
+    Bringup(bringup::Args) => bringup::run;
+    Capture(capture::Args) => capture::run;
+    Completions(completions::Args) => completions::run;
+    Live(live::Args) => live::run;
+    Replay(replay::Args) => replay::run;
+    Report(report::Args) => report::run;
+    Crossing(crossing::Args) => crossing::run;
+    Compare(compare::Args) => compare::run, campaign;
+    Envelope(envelope::Args) => envelope::run, campaign;
+    Montecarlo(montecarlo::Args) => montecarlo::run, campaign;
     #[command(flatten)]
-    Operate(operate::Verb),
-    Faults(faults::Args),
-    Flash(flash::Args),
-    Identify(identify::Args),
-    Keys(keys::Args),
-    Merge(merge::Args),
-    Params(params::Args),
-    Stress(stress::Args),
-    Sweep(sweep::Args),
-    Test(test::Args),
+    Operate(operate::Verb) => operate::run;
+    Faults(faults::Args) => faults::run, campaign;
+    Flash(flash::Args) => flash::run;
+    Identify(identify::Args) => identify::run;
+    Keys(keys::Args) => keys::run;
+    Merge(merge::Args) => merge::run;
+    Params(params::Args) => params::run;
+    Stress(stress::Args) => stress::run, campaign;
+    Sweep(sweep::Args) => sweep::run, campaign;
+    Test(test::Args) => test::run;
     /// Natural frequencies of the drive arm by the wave-vector method.
-    Modes(Passed),
+    Modes(Passed) => study;
     /// Run time against error.
-    Bench(Passed),
+    Bench(Passed) => study;
     /// The study's figures and which of its claims hold.
-    Paper(Passed),
+    Paper(Passed) => study;
 }
 
 /// Arguments of a verb that another part of `rig` has, see [`Extra`].
@@ -97,49 +126,8 @@ struct Passed {
     _all: Vec<OsString>,
 }
 
-impl Verb {
-    /// How the verb runs its campaign, if it has one; one that is not here cannot be merged.
-    fn campaign(&mut self) -> Option<&mut CampaignArgs> {
-        match self {
-            Self::Compare(args) => Some(&mut args.campaign),
-            Self::Envelope(args) => Some(&mut args.campaign),
-            Self::Faults(args) => Some(&mut args.campaign),
-            Self::Montecarlo(args) => Some(&mut args.campaign),
-            Self::Stress(args) => Some(&mut args.campaign),
-            Self::Sweep(args) => Some(&mut args.campaign),
-            _ => None,
-        }
-    }
-
-    fn run(&self) -> Result<Outcome, Failure> {
-        match self {
-            Self::Deploy(args) => deploy::run(args),
-            Self::Accept(args) => accept::run(args),
-            Self::Bringup(args) => bringup::run(args),
-            Self::Capture(args) => capture::run(args),
-            Self::Completions(args) => completions::run(args),
-            Self::Live(args) => live::run(args),
-            Self::Replay(args) => replay::run(args),
-            Self::Report(args) => report::run(args),
-            Self::Crossing(args) => crossing::run(args),
-            Self::Compare(args) => compare::run(args),
-            Self::Envelope(args) => envelope::run(args),
-            Self::Montecarlo(args) => montecarlo::run(args),
-            Self::Operate(verb) => operate::run(verb),
-            Self::Faults(args) => faults::run(args),
-            Self::Flash(args) => flash::run(args),
-            Self::Identify(args) => identify::run(args),
-            Self::Keys(args) => keys::run(args),
-            Self::Merge(args) => merge::run(args),
-            Self::Params(args) => params::run(args),
-            Self::Stress(args) => stress::run(args),
-            Self::Sweep(args) => sweep::run(args),
-            Self::Test(args) => test::run(args),
-            Self::Modes(_) | Self::Bench(_) | Self::Paper(_) => {
-                Err(Failure::Elsewhere(Extra::Study))
-            }
-        }
-    }
+fn study(_: &Passed) -> Result<Outcome, Failure> {
+    Err(Failure::Elsewhere(Extra::Study))
 }
 
 /// Runs the command with the arguments of this process.
@@ -189,12 +177,15 @@ mod tests {
     }
 
     #[test]
-    fn every_verb_and_option_has_help() {
+    fn every_verb_and_option_has_help_and_every_campaign_can_be_merged() {
+        let mut campaigns = 0;
         for verb in Cli::command().get_subcommands() {
             assert!(verb.get_about().is_some(), "{}", verb.get_name());
             for arg in verb.get_arguments() {
                 assert!(arg.get_help().is_some(), "{} {}", verb.get_name(), arg.get_id());
+                campaigns += usize::from(arg.get_id() == "shard");
             }
         }
+        assert_eq!(campaigns, Verb::CAMPAIGNS);
     }
 }

@@ -91,12 +91,10 @@ pub struct Compared {
     oracle_fails: Vec<(u64, String)>,
 }
 
-/// A comparison.
 #[derive(Clone, Debug, Serialize)]
 pub struct Comparison {
     /// Rigs drawn.
     pub runs: usize,
-    /// Reference gap, mm.
     pub gap_ref_mm: f64,
     /// The strategies, all held to the same worst gap, the scheduled one first; then the oracle.
     pub entries: Vec<Entry>,

@@ -25,7 +25,6 @@ pub struct Cell {
     pub load_n: f64,
     /// Whether the controller knows both; else it believes the scenario's.
     pub known: bool,
-    /// Strategy.
     pub controller: ControllerKind,
     /// Whether the drive reached the end of travel with every step crossed and no fault.
     pub completed: bool,

@@ -38,10 +38,8 @@ pub(crate) fn released(name: &str) -> Option<PathBuf> {
 /// Why an image is not available.
 #[derive(Debug, thiserror::Error)]
 pub enum FirmwareError {
-    /// This program could not be started.
     #[error("could not start `{0}`: {1}")]
     Start(String, io::Error),
-    /// The target is missing and could not be added, and why.
     #[error(
         "the Rust target {TARGET} is not installed and `rustup target add {TARGET}` failed: {0}"
     )]
@@ -49,18 +47,10 @@ pub enum FirmwareError {
     /// cargo did not build the binary; its own messages have gone to standard error.
     #[error("building {0} failed ({1})")]
     Build(String, ExitStatus),
-    /// cargo built something, but not this.
     #[error("cargo reported no executable for {0}")]
     NoExecutable(String),
-    /// The image could not be read.
     #[error("could not read {path}: {source}")]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: io::Error,
-    },
-    /// The file is not an image of this board.
+    Read { path: PathBuf, source: io::Error },
     #[error("not a firmware image: {0}")]
     Image(String),
 }
@@ -235,7 +225,6 @@ fn parse(elf: &[u8]) -> Result<ElfFile32<'_>, FirmwareError> {
     ElfFile32::parse(elf).map_err(|error| FirmwareError::Image(error.to_string()))
 }
 
-/// Address of a symbol.
 fn symbol(file: &ElfFile32<'_>, name: &str) -> Result<u64, FirmwareError> {
     let symbol = file.symbols().find(|symbol| symbol.name() == Ok(name));
     let address = symbol.map(|symbol| symbol.address());

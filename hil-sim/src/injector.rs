@@ -63,7 +63,6 @@ pub struct FaultInjector {
     undamaged: Option<(f64, f64, f64, f64)>,
 }
 
-/// One fault.
 struct Active {
     injection: Injection,
     /// When it came, s.

@@ -18,7 +18,6 @@ pub use outcome::{Least, LimitCount, Outcome, Quantiles, SeedReport, StepFound};
 /// The result of one run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct RunLine {
-    /// Seed of the plant.
     pub seed: u64,
     /// Whether it reached the end of travel with every step crossed and no fault.
     pub completed: bool,
@@ -56,7 +55,6 @@ pub struct RunLine {
     /// Mean true preload while moving, N.
     #[serde(deserialize_with = "or_nan")]
     pub mean_preload_n: f64,
-    /// Faults.
     pub faults: Vec<Report>,
     /// Codes of the limits that occurred, each once, ascending.
     pub limits: Vec<u16>,
@@ -181,7 +179,6 @@ fn one(scenario: &Scenario, seed: u64) -> Result<RunLine, RunError> {
     }
 }
 
-/// The sentence of a limit's code.
 fn limit_text(code: u16) -> &'static str {
     let known = Limit::ALL.into_iter().find(|limit| limit.code() == code);
     known.map_or("unknown limit", Limit::sentence)

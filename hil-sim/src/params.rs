@@ -23,39 +23,20 @@ pub use line::Client;
 pub enum StoreError {
     /// A file could not be read, or the emulated board's flash written.
     #[error("{path}: {source}")]
-    File {
-        /// The file.
-        path: String,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// A file could not be written.
+    File { path: String, source: std::io::Error },
     #[error(transparent)]
     Write(#[from] FileError),
     /// There is no valid set.
     #[error("{place}: {source}")]
-    Set {
-        /// Where.
-        place: String,
-        /// Why.
-        source: SetError,
-    },
-    /// No set could be made of the rig.
+    Set { place: String, source: SetError },
     #[error(transparent)]
     Compile(#[from] CompileError),
-    /// The board does not answer.
     #[error("the board does not answer within {seconds} s")]
-    Silent {
-        /// The timeout, s.
-        seconds: f64,
-    },
-    /// The board refuses; the active set is unchanged.
+    Silent { seconds: f64 },
     #[error("the board refuses: {0}")]
     Refused(&'static str),
-    /// The board answered another question.
     #[error("the board answered something else than it was asked")]
     Answer,
-    /// The connection to the board failed.
     #[error(transparent)]
     Port(#[from] PortError),
     /// The emulated board cannot be started.
@@ -71,7 +52,6 @@ pub struct Held {
     pub rig: Rig,
     /// Layout of its constants; if it is not [`SCHEMA`], they must be made again.
     pub schema: u16,
-    /// Hash of the parameters.
     pub hash: u32,
     /// Where it is, in words.
     pub origin: String,

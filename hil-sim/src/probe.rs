@@ -48,7 +48,6 @@ pub trait Port {
 
     fn reset(&mut self) -> Result<(), PortError>;
 
-    /// Reads memory.
     fn memory(&mut self, address: u32, into: &mut [u8]) -> Result<(), PortError>;
 
     /// Waits before the next poll of the board.

@@ -22,7 +22,6 @@ pub enum Extra {
     Board,
     /// The published study, and run time against error.
     Study,
-    /// A real debug probe.
     Probe,
 }
 
@@ -43,10 +42,8 @@ impl Extra {
 /// Why a part is not available. Displays as one line.
 #[derive(Debug, thiserror::Error)]
 pub enum ProvisionError {
-    /// A program could not be started or a build failed.
     #[error(transparent)]
     Build(#[from] FirmwareError),
-    /// The tools could not be put into this folder, and why.
     #[error(
         "could not set up cmake, ninja and libclang for the emulated board in {0}: {1} \
          (it takes Python 3 with venv or pip, PyPI within reach, and a C compiler)"

@@ -25,7 +25,6 @@ pub struct Replayed {
     pub events: u64,
     /// Plans from the log, and plans that were computed again.
     pub plans: (u64, u64),
-    /// The first difference.
     pub difference: Option<Difference>,
 }
 
@@ -45,9 +44,7 @@ pub struct Difference {
     /// The stage of the tick that gave the quantity.
     pub stage: &'static str,
     pub quantity: &'static str,
-    /// Recorded value.
     pub recorded: String,
-    /// Value of the replay.
     pub replayed: String,
 }
 
@@ -253,7 +250,6 @@ const OTHERS: [(&str, &[&str]); 3] = [
     ("loops", &["drive_duty", "pretightener_duty"]),
 ];
 
-/// The columns that a stage gives.
 fn given_by(stage: &str) -> impl Iterator<Item = &'static str> {
     let others = OTHERS.into_iter().filter(move |one| one.0 == stage).flat_map(|one| one.1);
     let quantities = Columns::QUANTITIES.iter().filter(move |column| column.stage == stage);

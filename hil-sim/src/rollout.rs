@@ -13,7 +13,6 @@ const HALVINGS: usize = 18;
 /// A crossing at constant speed and radial force.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct CrossingSetup {
-    /// Axial speed, mm/s.
     pub speed_mm_s: f64,
     /// Radial force on the wheel, N.
     pub preload_n: f64,

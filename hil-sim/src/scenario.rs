@@ -76,7 +76,6 @@ impl ScenarioError {
         Self::at(origin, format!("{key} = {found}: expected {expected}"))
     }
 
-    /// The value is outside its range.
     fn out_of_range(origin: &str, key: &str, value: f64, (min, max): (f64, f64)) -> Self {
         Self::wrong(origin, key, value, format!("a value from {min} to {max}"))
     }
@@ -197,7 +196,6 @@ impl Scenario {
         Ok((seed + 1..=last).collect())
     }
 
-    /// The plant of the scenario's seed.
     pub fn plant(&self) -> PlantParameters {
         self.plant_with(&self.drawn_mismatch())
     }

@@ -50,16 +50,12 @@ impl Options {
 /// Why a run could not be made.
 #[derive(Debug, thiserror::Error)]
 pub enum RunError {
-    /// The parameters do not make a controller.
     #[error("{0}")]
     Rig(#[from] RigError),
-    /// The plant of this seed is not possible.
     #[error("plant: {0}")]
     Refused(#[from] Refusal),
-    /// The plant's state became invalid.
     #[error("{0}")]
     Plant(#[from] PlantError),
-    /// A fault of a board's hardware, without a board.
     #[error("run.faults: {0} is a fault of the board's hardware: --target board")]
     Hardware(String),
 }
@@ -82,7 +78,6 @@ pub trait RunningRig {
     /// One millisecond with an operator's command or none; what the controller puts out.
     fn step(&mut self, command: Option<Command>) -> Result<Output, Self::Error>;
 
-    /// Mode of the controller.
     fn mode(&self) -> Mode;
 
     /// Whether an operator may give a command.

@@ -65,7 +65,6 @@ pub struct Worst {
 /// A case that failed, and why.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct StressFailure {
-    /// What happened.
     pub why: String,
     pub case: StressCase,
 }
@@ -73,13 +72,11 @@ pub struct StressFailure {
 /// Cases refused for the same reason.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Refused {
-    /// How many.
     pub count: usize,
     /// The message of the last.
     pub example: String,
 }
 
-/// Outcome of the stress.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct StressReport {
     pub cases: usize,

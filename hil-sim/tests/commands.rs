@@ -183,7 +183,6 @@ fn assert_three_crossings(bench: &Bench, scenario: &Scenario, name: &str) {
     }
 }
 
-/// Reference gap in this direction, mm.
 fn gap_ref(scenario: &Scenario, direction: units::Direction) -> f64 {
     let planner = interstage::model::Planner::try_build(&scenario.rig).expect("a sound rig");
     planner.gap_ref(direction).to_num()

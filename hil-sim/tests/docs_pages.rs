@@ -19,7 +19,6 @@ const ELSEWHERE: [&str; 3] = ["bench", "modes", "paper"];
 /// nobody to find the sentence that is needed.
 const MOST_WORDS: usize = 15_000;
 
-/// The workspace.
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..").canonicalize().expect("the workspace")
 }
@@ -332,7 +331,6 @@ fn pandas_draws_a_log_alike() {
     assert!(by_pandas.contains("gap") && by_pandas == by_csv);
 }
 
-/// Fields of each topic of a log.
 fn fields(log: &Path) -> BTreeMap<String, Vec<String>> {
     let bytes = fs::read(log).expect("a log");
     let mut topics = BTreeMap::new();

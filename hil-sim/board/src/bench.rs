@@ -41,7 +41,6 @@ pub struct Passed {
 
 /// A board and its plant.
 pub struct Bench<'a> {
-    /// The board.
     pub machine: Machine,
     pub plant: VirtualRig,
     sensors: Sensors,

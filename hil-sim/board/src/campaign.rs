@@ -51,7 +51,6 @@ const AHEAD: u64 = 2;
 /// An image and the strings of its log.
 #[derive(Clone, Copy)]
 pub struct Firmware<'a> {
-    /// The image.
     pub elf: &'a [u8],
     pub strings: &'a Strings,
 }

@@ -52,7 +52,6 @@ pub struct Defects {
     /// The noise at the analogue inputs is below half a step of 12 bits: each conversion of a mean
     /// gives the same.
     pub quiet_inputs: bool,
-    /// DMA moves nothing.
     pub dma_stalled: bool,
     /// Writes that clear the flags of the time driver's timer have no effect.
     pub timer_flags_stick: bool,
@@ -70,7 +69,6 @@ pub struct Chip {
     pub rcc: Rcc,
     /// Power control, with the supply.
     pub power: Pwr,
-    /// The flash's interface.
     pub flash: Flash,
     syscfg: Syscfg,
     exti: Exti,
@@ -87,7 +85,6 @@ pub struct Chip {
     mux: Registers,
     /// The angle sensor's bus.
     pub spi: Spi,
-    /// Independent watchdog.
     pub watchdog: Iwdg,
     /// Debug support: its freeze bits act while a debugger halts the core.
     debug: Registers,
@@ -98,7 +95,6 @@ pub struct Chip {
     wheel: i64,
     inputs: [u16; pins::ANALOG.len()],
     bridges: [Bridge; 2],
-    /// Faults of the hardware.
     pub defects: Defects,
     locked_up: bool,
     /// Accesses that no model answered.
@@ -244,7 +240,6 @@ impl Chip {
         self.settle(now);
     }
 
-    /// The core goes on.
     pub(crate) fn resume(&mut self, now: u64) {
         for motor in &mut self.motors {
             motor.freeze(false, 0, now);

@@ -7,9 +7,7 @@ pub enum Register {
     R(u8),
     /// Stack pointer in use.
     Sp,
-    /// Link register.
     Lr,
-    /// Program counter.
     Pc,
     /// Stack pointer of the thread on a stack of its own.
     Psp,
@@ -49,15 +47,12 @@ pub enum Stop {
     Fault {
         /// Program counter.
         at: u32,
-        /// Its kind.
         fault: Fault,
     },
 }
 
-/// Kind of a fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
-    /// An undefined instruction.
     Undefined,
     /// A fetch from an address without code.
     Fetch,
@@ -67,7 +62,6 @@ pub enum Fault {
     Write,
     /// A read or write that the memory protection unit forbids.
     Guarded,
-    /// Any other.
     Other,
 }
 
@@ -77,7 +71,6 @@ pub enum CoreError {
     /// The engine refused a request, with this answer.
     #[error("the emulator failed: {0}")]
     Engine(String),
-    /// There is no loop in which the program could hang.
     #[error("the image has no loop")]
     NoLoop,
 }
@@ -108,16 +101,13 @@ pub struct Mark {
     pub cycles: u64,
     /// Cycles that the flash would have cost so far, see [`super::accelerator`].
     pub waits: u64,
-    /// Where.
     pub address: u32,
-    /// Value of R0.
     pub r0: u32,
 }
 
 /// An access to an address without memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Access {
-    /// Where.
     pub address: u32,
     /// Bytes: 1, 2 or 4.
     pub size: u32,

@@ -83,7 +83,6 @@ pub enum CyclesError {
     Run(#[from] RunError),
     #[error(transparent)]
     Image(#[from] ImageError),
-    /// The core's output differs from the host's.
     #[error("tick {0} differs between host and core")]
     Differs(usize),
 }

@@ -66,7 +66,6 @@ impl Field {
     }
 }
 
-/// Bits of these fields.
 pub const fn bits(fields: &[Field]) -> u32 {
     let (mut bits, mut at) = (0, 0);
     while at < fields.len() {
@@ -79,7 +78,6 @@ pub const fn bits(fields: &[Field]) -> u32 {
 /// A register of a block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Register {
-    /// Name of the register.
     pub name: &'static str,
     /// Offset in the block, bytes.
     pub offset: u32,
@@ -109,7 +107,6 @@ impl Register {
 /// A peripheral at its place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Peripheral {
-    /// Its name.
     pub name: &'static str,
     /// Address of its first register.
     pub address: u32,

@@ -74,7 +74,6 @@ impl Loaded {
         self.symbols.iter().map(|(name, (value, size))| (name.as_str(), *value, *size))
     }
 
-    /// Value of a symbol.
     pub fn symbol(&self, name: &str) -> Result<u32, ImageError> {
         self.symbols
             .get(name)
@@ -89,7 +88,6 @@ pub fn function_at(functions: &[Function], address: u32) -> Option<usize> {
     after.checked_sub(1).filter(|found| functions[*found].range.contains(&address))
 }
 
-/// Its name.
 pub fn named(functions: &[Function], address: u32) -> &str {
     function_at(functions, address).map_or("nowhere", |found| &functions[found].name)
 }

@@ -10,13 +10,10 @@ use crate::core::CoreError;
 /// Why an image does not run.
 #[derive(Debug, thiserror::Error)]
 pub enum ImageError {
-    /// It is no image of the board.
     #[error("not an image of the board: {0}")]
     Form(String),
-    /// It lacks a function or another symbol.
     #[error("the image has no function {0}")]
     Missing(String),
-    /// The core stopped.
     #[error(transparent)]
     Core(#[from] CoreError),
     /// A call panicked or did not return.
@@ -40,16 +37,12 @@ impl ImageError {
 pub enum BoardError {
     #[error(transparent)]
     Image(#[from] ImageError),
-    /// The plant left the set of meaningful states.
     #[error(transparent)]
     Plant(#[from] PlantError),
-    /// The image's sections.
     #[error(transparent)]
     Firmware(#[from] FirmwareError),
-    /// The firmware has one controller.
     #[error("the firmware schedules: --controller {0} runs in software alone")]
     Controller(String),
-    /// The parameters make no planner.
     #[error(transparent)]
     Rig(#[from] RigError),
     /// The rig cannot be put into the board's flash.

@@ -10,15 +10,12 @@ pub mod number {
     /// Non-maskable interrupt.
     pub const NMI: u8 = 2;
     pub const HARD_FAULT: u8 = 3;
-    /// Memory management fault.
     pub const MEM_MANAGE: u8 = 4;
     pub const BUS_FAULT: u8 = 5;
     pub const USAGE_FAULT: u8 = 6;
-    /// Supervisor call.
     pub const SV_CALL: u8 = 11;
     /// Pendable service.
     pub const PEND_SV: u8 = 14;
-    /// System timer.
     pub const SYS_TICK: u8 = 15;
     /// First interrupt of the chip.
     pub const INTERRUPT: u8 = 16;
@@ -62,7 +59,6 @@ impl Default for Exceptions {
     }
 }
 
-/// Numbers of the bits that are set.
 fn bits(mut set: u128) -> impl Iterator<Item = u8> {
     std::iter::from_fn(move || {
         let next = set.trailing_zeros();
@@ -77,7 +73,6 @@ const fn interrupts(set: u128, word: u32) -> u32 {
 }
 
 impl Exceptions {
-    /// Makes an exception pending.
     pub fn pend(&mut self, number: u8) {
         if usize::from(number) < COUNT {
             self.pending |= 1 << number;

@@ -44,7 +44,6 @@ pub(super) struct BoardInjector {
     struck_later_s: Option<f64>,
     /// A task is to hang, or a save to be interrupted: the fault strikes after its onset.
     waits: bool,
-    /// Ticks are being lost.
     losing: bool,
     /// A reset or a halt within the millisecond, after this part of it.
     within: Option<(Injection, f64)>,

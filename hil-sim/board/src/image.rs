@@ -16,14 +16,11 @@ const RETURN: u32 = MAILBOX.base + MAILBOX.size - 4;
 pub const ARGUMENTS: u32 = MAILBOX.base;
 /// Longest call, cycles: ten seconds of the chip's time.
 const PATIENCE: u64 = 1_700_000_000;
-/// The breakpoint instruction.
 const BKPT: [u8; 2] = [0x00, 0xBE];
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Call {
-    /// Its return value.
     pub value: u32,
-    /// Its cost.
     pub meter: Meter,
 }
 
@@ -123,7 +120,6 @@ impl Image {
         Ok((values, spread))
     }
 
-    /// Name of the function at an address.
     fn name(&self, address: u32) -> &str {
         named(&self.loaded.functions, address)
     }

@@ -51,7 +51,6 @@ pub struct Cost {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct WithWaits {
     pub mean: f64,
-    /// Most.
     pub worst: u64,
 }
 
@@ -67,7 +66,6 @@ pub struct Load {
     pub load_with_waits: Option<f64>,
     /// The control tick with its task.
     pub tick: Cost,
-    /// Bytes of the stack that were used.
     pub stack_used: u32,
     /// Bytes set apart for the stack.
     pub stack: u64,
@@ -87,7 +85,6 @@ pub struct Gathered {
 }
 
 impl Gathered {
-    /// Counting begins.
     pub fn begin(&mut self, machine: &mut Machine) {
         machine.profile.take_polls();
         *self = Self {

@@ -8,7 +8,6 @@ use super::error::ImageError;
 pub struct Line {
     /// Level, in lower case; empty for plain output.
     pub level: String,
-    /// The message.
     pub text: String,
 }
 

@@ -19,7 +19,6 @@ const LOOK: u64 = 4000;
 
 /// An emulated board with nothing at its pins.
 pub struct EmulatedPort {
-    /// The board.
     pub machine: Machine,
     probe: Probe,
 }

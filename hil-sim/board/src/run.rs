@@ -32,7 +32,6 @@ const AFTER_RESTART_S: f64 = 1.0;
 pub struct Ran {
     /// Summary, ledger, rows, log.
     pub recording: Recording,
-    /// What it cost.
     pub load: Load,
     /// The board at the end.
     pub machine: Machine,

@@ -33,7 +33,6 @@ pub enum Kind {
 pub struct Instruction {
     /// Bytes: 2 or 4.
     pub size: u32,
-    /// Its class.
     pub kind: Kind,
 }
 

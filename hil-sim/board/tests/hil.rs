@@ -157,7 +157,6 @@ impl Rigged {
         Self { plant, sensors, given: Given::default() }
     }
 
-    /// A millisecond of both.
     fn tick(&mut self, line: &mut HostLine<'_>, tick: u32, command: Option<Command>) -> Taken {
         let codes = session::read(&mut self.sensors, &self.plant);
         self.given = Given::codes(codes.sensors, codes.bridges);

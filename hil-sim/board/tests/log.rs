@@ -48,7 +48,6 @@ fn every_tick_of_a_run_is_logged_and_runs_again_on_this_host() {
 enum Reader {
     /// One that keeps up.
     There,
-    /// None.
     Absent,
     /// One that stalls for 700 of every 1000 ms.
     Stalled,

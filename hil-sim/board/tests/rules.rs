@@ -25,13 +25,11 @@ struct Program {
 /// What a program does.
 #[derive(Clone, Copy)]
 enum Step {
-    /// Lets so many cycles pass.
     Wait(u64),
     /// Reads a register, changes fields, writes it back.
     Set(&'static str, &'static [(&'static str, u32)]),
 }
 
-/// Address of a register.
 fn address(register: &str) -> u32 {
     let (peripheral, name) = register.split_once('.').expect("PERIPHERAL.REGISTER");
     description::find(peripheral, name).unwrap_or_else(|| panic!("{register}")).0
@@ -95,7 +93,6 @@ impl Program {
         }
     }
 
-    /// Lets time pass.
     fn wait(&mut self, cycles: u64) {
         self.now += cycles;
         self.chip.advance(self.now);

@@ -25,7 +25,6 @@ pub struct Column {
 /// As many decimals as the number has.
 pub const AS_GIVEN: usize = usize::MAX;
 
-/// A column of these.
 pub const fn column(
     key: &'static str,
     name: &'static str,
@@ -35,7 +34,6 @@ pub const fn column(
     Column { key: Cow::Borrowed(key), name: Cow::Borrowed(name), unit, decimals }
 }
 
-/// Columns and rows.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frame {
     columns: Vec<Column>,
@@ -73,7 +71,6 @@ impl Frame {
             + &if count == 0 { String::new() } else { wrapped(&note, "  ", width()) }
     }
 
-    /// As comma-separated values.
     pub fn csv(&self) -> String {
         let mut table = csv::Writer::from_writer(Vec::new());
         let cell = |value: Option<&Value>| match value {

@@ -98,16 +98,17 @@ pub(super) fn seed(text: &str) -> Result<u64, &'static str> {
     seed.ok_or("expected a whole number, 0 or more, at most 9223372036854775807")
 }
 
+/// An option of a run that a verb may have no use for: its name, and the value that was given.
+pub(super) type Unused = (&'static str, fn(&RunArgs) -> Option<String>);
+pub(super) const CONTROLLER: Unused = ("controller", |args| args.controller.clone());
+pub(super) const SEED: Unused = ("seed", |args| args.seed.map(|seed| seed.to_string()));
+
 impl RunArgs {
-    /// Refuses the option `controller` or `seed`, and its key, where it has no effect.
-    pub(super) fn without(&self, option: &str, because: &str) -> Result<(), Failure> {
-        let given = match option {
-            "controller" => self.controller.clone(),
-            _ => self.seed.map(|seed| seed.to_string()),
-        };
+    /// Refuses an option, and its key, where it has no effect.
+    pub(super) fn without(&self, (option, given): Unused, because: &str) -> Result<(), Failure> {
         let key = format!("run.{option}=");
         let set = self.scenario.set.iter().find(|set| set.starts_with(&key));
-        let found = given.map(|value| format!("--{option} {value}"));
+        let found = given(self).map(|value| format!("--{option} {value}"));
         let found = found.or_else(|| set.map(|set| format!("--set {set}")));
         found.map_or(Ok(()), |found| {
             Err(Failure::input(format!("{found}: has no effect, as {because}")))

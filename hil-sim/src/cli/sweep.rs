@@ -8,7 +8,7 @@ use super::campaign::CampaignArgs;
 use super::crossing::{Method, check, compute};
 use super::failure::{Failure, Outcome};
 use super::output;
-use super::scenario::RunArgs;
+use super::scenario::{CONTROLLER, RunArgs, SEED};
 use crate::campaign::{AS_GIVEN, Campaign, Column, Frame, column};
 use crate::files::{make_directory, vacant, vacant_for, write_text};
 use crate::rollout::CrossingSetup;
@@ -68,8 +68,8 @@ type Measure = (&'static [Column], &'static [Plot]);
 
 pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     if args.crossing {
-        args.run.without("controller", "speed and preload of a crossing are given")?;
-        args.run.without("seed", "a crossing has no noise")?;
+        args.run.without(CONTROLLER, "speed and preload of a crossing are given")?;
+        args.run.without(SEED, "a crossing has no noise")?;
     }
     let base = args.run.resolve()?;
     let axes = axes(args, &base)?;

@@ -35,7 +35,6 @@ pub fn longest_s(rig: &Rig) -> f64 {
 /// What became of one fault at one instant.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Instant {
-    /// Seed of the rig.
     pub seed: u64,
     /// When the fault came, s since boot; none if it was present from the start.
     pub at_s: Option<f64>,
@@ -57,7 +56,6 @@ pub struct Instant {
     pub rest_ms: Option<f64>,
     /// How the run ended.
     pub end: Cow<'static, str>,
-    /// Largest preload, N.
     pub peak_preload_n: f64,
     /// Distance moved uncommanded, mm.
     pub motion_mm: f64,
@@ -173,7 +171,6 @@ pub struct FaultCampaign {
     pub scenario: Scenario,
     /// Instants a fault.
     pub instants: usize,
-    /// Faults to try.
     pub cases: Vec<Case>,
 }
 

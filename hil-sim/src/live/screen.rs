@@ -148,12 +148,10 @@ impl Screen {
         }
     }
 
-    /// Updates the rates.
     pub fn count(&mut self, counts: &Counts) {
         self.view.count(counts);
     }
 
-    /// Draws everything.
     pub fn draw(&self, frame: &mut Frame<'_>, counts: &Counts) {
         let Rect { width, height, .. } = frame.area();
         let log_lines = if height < WIDE.1 { 4 } else { 10 };

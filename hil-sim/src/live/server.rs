@@ -60,7 +60,6 @@ pub struct Server {
 type Clients = Arc<Mutex<Vec<SyncSender<Arc<Published>>>>>;
 
 impl Server {
-    /// Listens at `address`.
     pub fn bind(address: &str) -> io::Result<Self> {
         let listener = TcpListener::bind(address)?;
         let address = listener.local_addr()?;
@@ -70,7 +69,6 @@ impl Server {
         Ok(Self { address, clients })
     }
 
-    /// Where it listens.
     pub const fn address(&self) -> SocketAddr {
         self.address
     }

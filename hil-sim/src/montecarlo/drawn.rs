@@ -10,7 +10,6 @@ use crate::scenario::{MismatchDraw, Scenario};
 /// controller knows.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Drawn {
-    /// Key of the scenario.
     pub key: String,
     /// Least value over the runs.
     pub least: f64,

@@ -8,13 +8,9 @@ use crate::scenario::Scenario;
 /// Median, 95th and 99th percentile and maximum of a figure over the runs that have it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Quantiles {
-    /// Median.
     pub p50: f64,
-    /// 95th percentile.
     pub p95: f64,
-    /// 99th percentile.
     pub p99: f64,
-    /// Largest.
     pub max: f64,
     /// Seed of the largest; the lowest of several.
     pub seed: u64,
@@ -23,7 +19,6 @@ pub struct Quantiles {
 /// Least of a figure over the runs that have it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Least {
-    /// The figure.
     pub min: f64,
     /// Its seed; the lowest of several.
     pub seed: u64,
@@ -32,20 +27,16 @@ pub struct Least {
 /// A fault or failure, and in which run.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct SeedReport {
-    /// The run's seed.
     pub seed: u64,
     /// The fault's code; none if the plant failed.
     pub code: Option<u16>,
-    /// Sentence.
     pub text: String,
 }
 
 /// How many runs met a limit.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct LimitCount {
-    /// The limit's code.
     pub code: u16,
-    /// Sentence.
     pub text: &'static str,
     /// Runs in which it occurred.
     pub runs: usize,
@@ -58,7 +49,6 @@ pub struct StepFound {
     pub index: u8,
     /// Runs in which it was found.
     pub runs: usize,
-    /// Distance, mm.
     #[serde(flatten)]
     pub off_mm: Quantiles,
 }
@@ -66,13 +56,11 @@ pub struct StepFound {
 /// A campaign; `rig montecarlo --json` prints it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Outcome {
-    /// Runs made.
     pub runs: usize,
     /// Runs that reached the end of travel with every step crossed and no fault.
     pub completed: usize,
     /// Largest gap at a step, or separation elsewhere, mm.
     pub worst_gap_mm: Option<f64>,
-    /// Its seed.
     pub worst_gap_seed: Option<u64>,
     /// Crossings with gross slip, and runs that slipped elsewhere.
     pub slip_events: usize,
@@ -102,7 +90,6 @@ pub struct Outcome {
     pub end_off_mm: Option<Quantiles>,
     /// The same over the one sigma that the controller states of its position there.
     pub end_off_sigmas: Option<Quantiles>,
-    /// Distances with which the steps were found.
     pub steps_found: Vec<StepFound>,
     /// Least time by which the preload was reached before a corner touched, s.
     pub lead_time_s: Option<Least>,

@@ -224,7 +224,6 @@ pub(super) struct Limits {
     pub(super) sign: f64,
     /// Coordinate of the end of travel, mm.
     pub(super) end_mm: f64,
-    /// Longest run, s.
     pub(super) longest_s: f64,
 }
 

@@ -13,7 +13,6 @@ const LEG_MM: f64 = 17.0;
 /// Part of the preload limit that each leg leaves to the next: the wheel still rises a little as
 /// its patch leaves the edge behind it, and the screw answers late.
 const HANDED_OVER: f64 = 1e-3;
-/// Longest leg, s.
 const LONGEST_S: f64 = 12.0;
 
 /// Speed and preload of a leg.
@@ -25,7 +24,6 @@ pub(super) struct Leg {
     pub(super) before_mm: f64,
     /// Distance behind the event up to which it is kept, mm; negative is before it.
     pub(super) after_mm: f64,
-    /// Preload, N.
     pub(super) preload_n: f64,
     /// Time before which the wheel rests, s.
     pub(super) start_s: f64,

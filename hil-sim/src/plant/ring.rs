@@ -134,7 +134,6 @@ impl Ring {
         self.ready = Ready::default();
     }
 
-    /// Wheel and rubber.
     pub fn parameters(&self) -> &RingParameters {
         &self.parameters
     }

@@ -138,7 +138,6 @@ section! {
 /// Sensors of one plant.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SensorParameters {
-    /// Encoder counts per turn.
     pub counts_per_turn: f64,
     /// Full scale at 90 % of the converter, N.
     pub preload_full_scale_n: f64,
@@ -150,7 +149,6 @@ pub struct SensorParameters {
     pub compression_gain: f64,
     /// Code with the arm along the pillar.
     pub angle_zero_code: f64,
-    /// Zero error, rad.
     pub angle_zero_rad: f64,
     /// Gain error factors of the bridges' readback: supply, divider and reference.
     pub readback_gain: [f64; 2],
@@ -158,7 +156,6 @@ pub struct SensorParameters {
     pub readback_zero: [f64; 2],
     /// Factor of its time constant.
     pub readback_lag: f64,
-    /// Noise and delays.
     pub noise: Noise,
 }
 
@@ -183,7 +180,6 @@ impl Codes {
     }
 }
 
-/// Sensors with their noise.
 #[derive(Clone, Debug)]
 pub struct Sensors {
     parameters: SensorParameters,

@@ -7,19 +7,15 @@ use serde::{Deserialize, Serialize};
 /// A key of a section.
 #[derive(Clone, Copy, Debug)]
 pub struct Field<T> {
-    /// Its name.
     pub name: &'static str,
     /// Value of the usual rigs.
     pub usual: f64,
-    /// Values that it takes.
     pub range: (f64, f64),
     /// Range of the wide draw; none if it is not drawn.
     pub wide: Option<(f64, f64)>,
-    /// Its place.
     pub(super) of: fn(&mut T) -> &mut f64,
 }
 
-/// A section.
 pub trait Section: Clone + 'static {
     /// All keys, in the order in which they are drawn: a new one comes last.
     const FIELDS: &'static [Field<Self>];

@@ -3,14 +3,12 @@
 /// What is true after a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Truth {
-    /// Time, s.
     pub time_s: f64,
     /// Mean outputs of the bridges of drive and pre-tightener, parts of the supply. One that
     /// is off shows what its motor generates.
     pub bridges: [f64; 2],
     /// Axial position of the wheel centre, mm.
     pub position_mm: f64,
-    /// Axial speed, mm/s.
     pub speed_mm_s: f64,
     /// Tread speed by the wheel's spin, mm/s.
     pub tread_mm_s: f64,

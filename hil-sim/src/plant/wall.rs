@@ -6,7 +6,6 @@
 pub struct Step {
     /// Axial position of the face, mm.
     pub position_mm: f64,
-    /// Height, mm.
     pub height_mm: f64,
 }
 
@@ -68,7 +67,6 @@ pub struct LocalWall {
     pub root_mm: f64,
     /// Rise of the wall per axial travel.
     pub slope: f64,
-    /// Radius of the edges, mm.
     pub edge_radius_mm: f64,
 }
 

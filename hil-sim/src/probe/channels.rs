@@ -11,7 +11,6 @@ pub enum ChannelError<E> {
     Failed(E),
 }
 
-/// The result of an access.
 pub type Access<T, E> = Result<T, ChannelError<E>>;
 
 impl<E> From<E> for ChannelError<E> {
@@ -59,7 +58,6 @@ impl<H> Default for Channels<H> {
 }
 
 impl<H> Channels<H> {
-    /// Drops the handle.
     pub fn forget(&mut self) {
         *self = Self::default();
     }

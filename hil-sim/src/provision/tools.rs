@@ -23,9 +23,7 @@ const COMPLETE: &str = "complete";
 /// build, or cargo would build the core again each time.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Tools {
-    /// Folder of the programs.
     programs: PathBuf,
-    /// Folder of libclang.
     libclang: PathBuf,
     /// Folder of the compiler's own headers, which libclang as a wheel lacks.
     headers: PathBuf,

@@ -37,24 +37,20 @@ pub enum Item {
 pub enum Mark {
     /// Frames are missing.
     Lost {
-        /// How many.
         frames: u32,
         /// How many of them the target dropped because its channel was full.
         dropped: u32,
     },
     /// Bytes that belong to no frame.
     Garbage {
-        /// How many.
         bytes: u64,
     },
     /// Ticks are missing although no frame is: the journal task was too late.
     Skipped {
-        /// How many.
         ticks: u32,
     },
     /// Ticks did not run: the control tick was late.
     Overrun {
-        /// How many.
         ticks: u32,
     },
     /// The log does not begin with the target's first frame.
@@ -62,10 +58,11 @@ pub enum Mark {
         /// How many went before.
         frames: u32,
     },
-    /// The target restarted.
     Restart,
     /// A frame of another layout than this reader knows, and its number.
-    Schema { found: u16 },
+    Schema {
+        found: u16,
+    },
 }
 
 impl std::fmt::Display for Mark {
@@ -94,7 +91,6 @@ impl std::fmt::Display for Mark {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Counts {
     pub bytes: u64,
-    /// Valid frames.
     pub frames: u64,
     pub ticks: u64,
     /// Frames known to be missing.
@@ -105,7 +101,6 @@ pub struct Counts {
     pub garbage_bytes: u64,
     /// Ticks known to be missing, by the clock.
     pub lost_ticks: u64,
-    /// Ticks that never ran.
     pub overrun_ticks: u64,
     /// Times that the target restarted.
     pub restarts: u64,

@@ -74,15 +74,11 @@ pub(super) const TICK_NS: u64 = 1_000_000;
 /// The topic of a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Topic {
-    /// A [`Tick`].
     Tick,
     /// An event or a mark as a line of text.
     Log,
-    /// A [`LedgerLine`].
     Ledger,
-    /// A [`CrossingLine`].
     Crossing,
-    /// A [`Summary`].
     Summary,
     Frames,
 }
@@ -159,7 +155,6 @@ fn level(entry: &Entry) -> u8 {
     }
 }
 
-/// An MCAP file that grows.
 pub(super) struct McapFile<W: Write + Seek> {
     out: mcap::Writer<W>,
     /// Channel and number of messages of each topic.

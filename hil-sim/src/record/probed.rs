@@ -9,7 +9,6 @@ use crate::probe::{CONSOLE, LOG, Port, ReconnectingPort};
 
 /// Polls of the channel per call, so that the display is updated in between.
 const POLLS: u32 = 20;
-/// Letter of the command that stops the drive.
 const STOP: u8 = letter(Command::Stop);
 
 /// The log of a board at a probe. The board is not reset and gets only the operator's
@@ -25,7 +24,6 @@ pub struct Probed<'a> {
 }
 
 impl<'a> Probed<'a> {
-    /// Over this port.
     pub const fn new(port: ReconnectingPort<'a>) -> Self {
         Self { port, letters: VecDeque::new(), news: Vec::new() }
     }

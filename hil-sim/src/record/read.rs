@@ -20,10 +20,8 @@ pub enum ReadError {
     /// The file at this path cannot be read.
     #[error("{0}: {1}")]
     File(String, std::io::Error),
-    /// The table at this path has neither ledger nor events, which a report shows.
     #[error("{0}: a table of ticks has no crossings and no events: give the log.mcap of the run")]
     Table(String),
-    /// The file at this path is no log, and why.
     #[error("{0}: no log of the controller: {1}")]
     Content(String, String),
 }
@@ -217,7 +215,6 @@ pub(super) mod tests {
 
     use crate::record::decoder::tests::frames;
 
-    /// Reads a file of these bytes.
     pub(crate) fn read(bytes: &[u8]) -> Result<Run, ReadError> {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("log");

@@ -309,7 +309,6 @@ mod tests {
         let page = crate::report::html(&believed, &[]);
         assert!(page.contains("Deployed") && !page.contains("NaN"), "{}", &page[..2000]);
     }
-    /// A log of these messages.
     fn log(messages: &[(&str, Value)]) -> Vec<u8> {
         let mut file = std::io::Cursor::new(Vec::new());
         let mut writer = mcap::Writer::new(&mut file).unwrap();

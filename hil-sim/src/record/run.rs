@@ -77,7 +77,6 @@ pub enum Unknown {
     /// Neither parameters nor the name of a rig are in the log.
     #[error("its rig is not known")]
     Unnamed,
-    /// It was made with parameters of this hash; those at hand have the other one.
     #[error("made with parameters {0}, these are {1}")]
     Other(String, String),
     /// The parameters that it has, or what is laid over them, are wrong.

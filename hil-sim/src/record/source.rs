@@ -13,7 +13,6 @@ pub enum SourceError {
     /// The bytes of the input of this name cannot be read.
     #[error("{0}: {1}")]
     Read(String, std::io::Error),
-    /// The run failed.
     #[error(transparent)]
     Run(Box<dyn std::error::Error + Send + Sync>),
     #[error(transparent)]
@@ -34,7 +33,6 @@ pub trait Source {
     }
 }
 
-/// Letter of a command on the console.
 pub const fn letter(command: Command) -> u8 {
     match command {
         Command::Start => b's',
@@ -104,7 +102,6 @@ pub struct Virtual<R> {
 }
 
 impl Virtual<Session> {
-    /// A session of this scenario.
     pub fn new(scenario: &Scenario, attended: bool) -> Result<Self, session::RunError> {
         let session = Session::new(scenario, session::Options::default())?;
         Ok(Self::of(session.logging(), scenario, attended))

@@ -59,16 +59,13 @@ pub struct Report {
     pub t_s: f64,
     /// Stable code.
     pub code: u16,
-    /// Sentence.
     pub text: String,
 }
 
-/// One line of the log as text.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LogLine {
     /// When, s since boot.
     pub t_s: f64,
-    /// What.
     pub text: String,
 }
 
@@ -123,7 +120,6 @@ pub struct Summary {
     /// Longest time that it was given, s, if that cut it off.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub cut_off_s: Option<f64>,
-    /// Distance travelled, mm.
     pub travel_mm: f64,
     /// One sigma of the position at the end by the controller, mm; none if nothing bears it out.
     #[serde(default)]
@@ -155,7 +151,6 @@ pub struct Summary {
     pub real_time_factor: f64,
     /// SHA-256 over the controller's trace.
     pub trace_digest: String,
-    /// Ledger.
     pub crossings: Vec<CrossingLine>,
 }
 
@@ -216,9 +211,7 @@ pub struct LedgerLine {
     pub speed_dip_mm_s: f64,
     /// Measured preload at that instant, N.
     pub preload_n: f64,
-    /// Largest measured preload, N.
     pub peak_preload_n: f64,
-    /// Largest tread compression, mm.
     pub compression_mm: f64,
     /// Gap by the model, mm.
     pub gap_predicted_mm: f64,
@@ -232,7 +225,6 @@ pub struct LedgerLine {
     pub slip_margin: f64,
     /// Travel of the tread beyond the axial travel since the last step found, mm.
     pub slip_mm: f64,
-    /// Slip measured on the corner, mm.
     #[serde(default)]
     pub slip_measured_mm: Option<f64>,
     /// Measured height of the step, mm.

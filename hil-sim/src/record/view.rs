@@ -71,7 +71,6 @@ impl View {
         true
     }
 
-    /// The latest tick.
     pub const fn row(&self) -> Option<&Controller> {
         self.row.as_ref()
     }

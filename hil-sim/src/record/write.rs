@@ -27,7 +27,6 @@ pub struct WriteError {
     pub ticks: u64,
     /// Ticks flushed.
     pub kept: u64,
-    /// The system's error.
     source: Failure,
 }
 

@@ -19,10 +19,8 @@ use crate::table::number;
 pub struct Difference {
     /// Step number.
     pub index: u8,
-    /// Name of the quantity.
     pub quantity: &'static str,
     pub unit: &'static str,
-    /// Decimals that are shown.
     #[serde(skip)]
     pub decimals: usize,
     /// In the first run.

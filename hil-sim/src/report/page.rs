@@ -17,7 +17,6 @@ pub(super) const SIZE: (u32, u32) = (1100, 210);
 /// A section of a page beside those that every run has.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Section {
-    /// Its heading.
     pub title: &'static str,
     /// Its content, as HTML.
     pub body: String,

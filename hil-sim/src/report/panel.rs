@@ -129,7 +129,6 @@ pub struct HeatCell {
     pub text: String,
 }
 
-/// One plot.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Panel {
     pub title: String,
@@ -139,7 +138,6 @@ pub struct Panel {
     pub x_name: String,
     pub x_axis: Scale,
     pub y_axis: Scale,
-    /// Horizontal range.
     pub x: (f64, f64),
     /// Vertical range, where the data are not to decide.
     pub y: Option<(f64, f64)>,

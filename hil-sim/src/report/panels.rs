@@ -79,7 +79,6 @@ pub(super) struct View<'a> {
 }
 
 impl<'a> View<'a> {
-    /// All of `recording`.
     pub(super) fn new(recording: &'a Recording, across: Across) -> Self {
         let rows = &recording.rows[..];
         let parameters = Scenario::parse("parameters", &recording.parameters, &[]);
@@ -128,7 +127,6 @@ impl<'a> View<'a> {
         Line { name: name.into(), look, points }
     }
 
-    /// Lines of these fields.
     pub(super) fn lines<const N: usize>(&self, fields: [Field; N]) -> Vec<Line> {
         fields.map(|(name, look, of)| self.line(name, look, of)).into()
     }

@@ -63,7 +63,6 @@ pub(crate) struct Geometry {
     pub(super) spring_n_per_mm: f64,
     /// Preload on the smooth wall, N.
     pub(super) cruise_n: f64,
-    /// Largest preload, N.
     pub(super) limit_n: f64,
     /// Position of each face and height of its step, mm, ascending.
     pub(super) steps: Vec<(f64, f64)>,
@@ -193,7 +192,6 @@ fn event(geometry: &Geometry, rows: &[&Tick], line: &CrossingLine) -> Event {
     }
 }
 
-/// The values of [`COLUMNS`].
 fn values(geometry: &Geometry, row: &Tick) -> [f64; COLUMNS.len()] {
     COLUMNS.map(|(_, decimals, of)| {
         let scale = 10_f64.powi(decimals);

@@ -62,7 +62,6 @@ impl Grade {
         [32, 33, 31][self as usize]
     }
 
-    /// Grade of a run.
     pub(crate) fn of(summary: &Summary) -> Self {
         if !summary.completed || !summary.faults.is_empty() {
             Self::Bad

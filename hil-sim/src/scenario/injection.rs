@@ -24,9 +24,7 @@ pub enum Onset {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Injection {
-    /// What breaks.
     pub target: Target,
-    /// How.
     pub kind: Kind,
     /// Onset: time since boot, s.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -11,7 +11,6 @@ use crate::plant::sensors::Noise;
 use crate::plant::spread::Spread;
 use crate::plant::spread::{Field, Section};
 
-/// Names of the presets.
 pub const PRESETS: [&str; 2] = ["prototype", "fe"];
 
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -28,7 +27,6 @@ pub struct KeyInfo {
     pub range: Option<(f64, f64)>,
     /// Whether it is a property of the rig, to be measured there, not a choice.
     pub measure: bool,
-    /// What it is.
     pub description: String,
 }
 
@@ -41,11 +39,9 @@ pub(super) enum Kind {
     Integer,
     /// A list of at most so many numbers.
     Numbers(usize),
-    /// One of these words.
     Word(&'static [&'static str]),
     /// A list of step anomalies.
     Anomalies,
-    /// A list of faults.
     Faults,
 }
 
@@ -331,15 +327,5 @@ mod tests {
         assert_eq!(listed.len(), leaves(&table).len());
         assert_eq!(listed.len(), descriptions().len());
         assert!(listed.iter().all(|key| key.description.len() > 4));
-    }
-
-    #[test]
-    fn units_come_from_the_end_of_the_name() {
-        assert_eq!(unit("drive.jerk_mm_s3"), "mm/s^3");
-        assert_eq!(unit("tread.tau_s"), "s");
-        assert_eq!(unit("tread.k_inf_pa_per_m"), "Pa/m");
-        assert_eq!(unit("sense.encoder_counts"), "counts");
-        assert_eq!(unit("tread.stiffening"), "");
-        assert_eq!(stem("tau_ms"), stem("tau_s"));
     }
 }

@@ -224,8 +224,10 @@ fn every_message_is_one_line() {
 #[test]
 fn keys_have_unit_value_and_description() {
     let keys = Scenario::default().keys();
-    let tau = keys.iter().find(|k| k.key == "tread.tau_s").unwrap();
+    let of = |name: &str| keys.iter().find(|k| k.key == name).unwrap();
+    let tau = of("tread.tau_s");
     assert_eq!((tau.unit, tau.value.as_float()), ("s", Some(0.1059)));
+    assert_eq!((of("drive.jerk_mm_s3").unit, of("tread.stiffening").unit), ("mm/s^3", ""));
     assert_eq!(tau.description, "Relaxation time tau, s.");
     assert!(keys.iter().any(|k| k.key == "run.anomalies"));
     assert_eq!(keys[0].key, "preset");

@@ -48,7 +48,6 @@ pub enum Course {
 }
 
 impl Course {
-    /// All of them.
     pub const ALL: [Self; 5] =
         [Self::Forward, Self::Back, Self::Reversing, Self::Rocking, Self::Coasting];
 
@@ -67,10 +66,8 @@ impl Course {
     }
 }
 
-/// One set of parameters.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct StressCase {
-    /// Its number.
     pub index: usize,
     /// Relaxed stiffness of the contact, Pa/m.
     pub k_inf_pa_per_m: f64,
@@ -81,19 +78,16 @@ pub struct StressCase {
     pub dt_s: f64,
     /// Moved mass over reflected mass.
     pub mass_ratio: f64,
-    /// Moved mass, kg.
     pub mass_kg: f64,
     pub speed_mm_s: f64,
     /// Height of the step, mm.
     pub step_mm: f64,
-    /// Friction.
     pub mu: f64,
     pub preload_n: f64,
     /// Axial load, N.
     pub load_n: f64,
     /// Sense of the arm's coupling.
     pub coupling: f64,
-    /// How it is driven.
     pub course: Course,
     /// Rate of the preload spring, N/mm.
     pub spring_n_per_mm: f64,

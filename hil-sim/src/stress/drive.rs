@@ -70,7 +70,6 @@ fn ticks(case: &StressCase) -> usize {
     (travel / per_tick).ceil().clamp(LEAST_TICKS, BUDGET / strides) as usize
 }
 
-/// Drives `case`.
 pub(super) fn run(case: &StressCase, plant: &PlantParameters) -> Result<Drove, PlantError> {
     let ticks = ticks(case);
     let travel = case.speed_mm_s * case.dt_s * ticks as f64;
@@ -159,7 +158,6 @@ pub(super) struct Roll {
     pub resolved_mj: f64,
 }
 
-/// Rolls `case`.
 pub(super) fn roll(case: &StressCase) -> Result<Roll, BalanceError> {
     let per_tick = case.speed_mm_s * case.dt_s;
     let parts = (per_tick / STRIDE_MM).ceil().clamp(1.0, MOST_STRIDES);

@@ -34,7 +34,6 @@ pub struct Options {
     pub quick: bool,
 }
 
-/// Everything that was measured.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Report {
     /// The rolled-out tread.

@@ -48,11 +48,9 @@ pub const SOURCES: [Source; 3] = [Source::Theory, Source::Simulation, Source::Ex
 /// Values of one source.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Series {
-    /// Where from.
     pub source: Source,
     /// Which of several; empty if there is one.
     pub name: String,
-    /// Points, x and y.
     pub points: Vec<(f64, f64)>,
     /// Range over all runs: x, least and largest; empty if there is none.
     pub range: Vec<(f64, f64, f64)>,
@@ -98,7 +96,6 @@ pub struct Chart {
     pub logarithmic: bool,
     /// Smallest vertical axis.
     pub least_y: Option<(f64, f64)>,
-    /// What is drawn.
     pub series: Vec<Series>,
 }
 
@@ -129,7 +126,6 @@ impl Chart {
 /// A published number beside ours.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Mark {
-    /// What.
     pub what: String,
     /// Its unit; empty for ratios.
     pub unit: &'static str,
@@ -144,7 +140,6 @@ pub struct Mark {
 /// One of ours beside a published number.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Ours {
-    /// Where from.
     pub source: Source,
     /// Ours.
     pub value: f64,
@@ -177,7 +172,6 @@ impl Mark {
 pub struct Figure {
     /// Number in the study, as `fig20`.
     pub id: &'static str,
-    /// Name of the file.
     pub file: String,
     pub title: &'static str,
     /// What is shown and how it was got.

@@ -20,7 +20,6 @@ const EDGE_MM: f64 = -0.2;
 /// Everything that the page refers to.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ModelFigures {
-    /// The three cases.
     pub cases: Vec<CaseFigures>,
     /// Waves in three rubbers.
     pub rubbers: Vec<RubberFigures>,
@@ -36,13 +35,11 @@ pub struct ModelFigures {
 /// Figures of one case, published and ours.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CaseFigures {
-    /// Axial speed, mm/s.
     pub speed_mm_s: f64,
     pub preload_n: f64,
     pub published_gap_mm: f64,
     /// Gap without inertia, mm; the tread is fitted to it.
     pub gap_mm: f64,
-    /// Published collision force, N.
     pub published_force_n: f64,
     /// Largest collision force without inertia, N.
     pub force_n: f64,
@@ -67,11 +64,9 @@ pub struct CaseFigures {
 /// Stress waves in one rubber.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RubberFigures {
-    /// The rubber.
     pub name: &'static str,
     /// Transit of the tread by the front, ms.
     pub front_ms: f64,
-    /// By slow waves, ms.
     pub slow_ms: f64,
     /// Largest attenuation over the tread, dB.
     pub loss_db: f64,

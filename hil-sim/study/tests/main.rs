@@ -6,12 +6,10 @@ mod docs;
 mod fe;
 mod paper;
 
-/// Whether the long tests run.
 fn long() -> bool {
     std::env::var_os("RIG_LONG").is_some()
 }
 
-/// A file of the documentation.
 fn doc(name: &str) -> String {
     let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs").join(name);
     std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))

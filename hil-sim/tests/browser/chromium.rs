@@ -88,7 +88,6 @@ impl Browser {
         browser
     }
 
-    /// Calls a method of the protocol.
     pub(super) fn call(&mut self, method: &str, parameters: &Value) -> Value {
         self.calls += 1;
         let mut request = json!({ "id": self.calls, "method": method, "params": parameters });
@@ -118,7 +117,6 @@ impl Browser {
         answer["result"]["value"].take()
     }
 
-    /// The number that an expression has.
     pub(super) fn number(&mut self, expression: &str) -> f64 {
         let value = self.value(expression);
         value.as_f64().unwrap_or_else(|| panic!("{expression}: {value}"))
@@ -147,7 +145,6 @@ impl Browser {
         self.call("Emulation.setDeviceMetricsOverride", &size);
     }
 
-    /// Chooses medium and colours.
     pub(super) fn media(&mut self, medium: &str, colours: &str) {
         let feature = json!([{ "name": "prefers-color-scheme", "value": colours }]);
         self.call("Emulation.setEmulatedMedia", &json!({ "media": medium, "features": feature }));
@@ -166,7 +163,6 @@ impl Browser {
         self.mouse("mouseMoved", at, 0);
     }
 
-    /// Clicks so many times there.
     pub(super) fn click(&mut self, at: (f64, f64), times: u8) {
         for count in 1..=times {
             self.mouse("mousePressed", at, count);
@@ -174,7 +170,6 @@ impl Browser {
         }
     }
 
-    /// Drags from one point to another.
     pub(super) fn drag(&mut self, from: (f64, f64), to: (f64, f64)) {
         self.mouse("mousePressed", from, 1);
         self.mouse("mouseMoved", to, 1);

@@ -22,15 +22,11 @@ use rayon::prelude::*;
 /// Inputs of the controller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Feed {
-    /// Every code at its least.
     Least,
-    /// Every code at its largest.
     Largest,
-    /// Least and largest in alternation.
     Alternating,
     /// Valid codes of a rig that jumps.
     Jumping,
-    /// Random codes at random times.
     Garbage,
     /// Plausible codes at rest, random plans and commands.
     Plans,
@@ -180,7 +176,6 @@ fn frame(
     }
 }
 
-/// A plan of extremes.
 fn wild(request: &PlanRequest, planner: &Planner, random: &mut ChaCha8Rng) -> Plan {
     let mut any = || match random.random_range(0..4) {
         0 => Q16::MIN,

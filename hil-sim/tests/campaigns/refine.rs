@@ -24,7 +24,6 @@ const GRAIN: f64 = 5e-4;
 /// Differences below this part of the value are rounding, and what the balance leaves.
 const ROUNDING: f64 = 1e-8;
 
-/// Strides, mm.
 const STRIDES_MM: [f64; 3] = [0.08, 0.04, 0.02];
 
 /// Halfway up the step of 4 mm, before its face, and where the wheel starts, mm.

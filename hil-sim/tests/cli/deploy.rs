@@ -14,7 +14,6 @@ const KEYS: &str = "completed target controller seed duration_s moving_s travel_
 const CROSSING_KEYS: &str = "index speed_mm_s preload_n gap_mm gap_predicted_mm gap_measured_mm \
     corner_force_n lead_time_s limited_by slip_mm";
 
-/// The files of a run.
 const FILES: &str = "report.html log.mcap log.csv log.csv-metadata.json summary.json overview.svg";
 
 fn assert_keys(value: &Value, keys: &str) {

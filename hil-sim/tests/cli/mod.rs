@@ -27,7 +27,6 @@ impl Deref for Folder {
     }
 }
 
-/// An empty one.
 pub(crate) fn folder() -> Folder {
     Folder(tempfile::tempdir().expect("a temporary directory"))
 }
@@ -51,17 +50,14 @@ pub(crate) fn json(path: &Path) -> Value {
     serde_json::from_slice(&std::fs::read(path).expect("a file")).expect("JSON")
 }
 
-/// The exit code.
 pub(crate) fn code(output: &Output) -> i32 {
     output.status.code().expect("the command was not killed")
 }
 
-/// Standard output as text.
 fn stdout(output: &Output) -> &str {
     std::str::from_utf8(&output.stdout).expect("text")
 }
 
-/// Standard error as text.
 pub(crate) fn stderr(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
@@ -91,7 +87,6 @@ fn good(arguments: &[&str]) -> Value {
     object(&good_in(&folder(), arguments))
 }
 
-/// The number at `key`.
 fn number(value: &Value, key: &str) -> f64 {
     value[key].as_f64().unwrap_or_else(|| panic!("{key} is no number in {value}"))
 }
@@ -117,7 +112,6 @@ fn refused(arguments: &[&str], names: &[&str]) {
     assert!(is_empty(at), "{arguments:?} left files");
 }
 
-/// Whether `directory` is empty.
 fn is_empty(directory: &Path) -> bool {
     std::fs::read_dir(directory).expect("a directory").next().is_none()
 }

@@ -7,7 +7,6 @@ use serde_json::Value;
 
 use super::{code, folder, good, good_in, number, rig, stderr, stdout};
 
-/// The key of this name.
 fn of<'a>(keys: &'a [Value], name: &str) -> &'a Value {
     keys.iter().find(|key| key["key"] == name).unwrap()
 }

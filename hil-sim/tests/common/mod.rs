@@ -18,10 +18,8 @@ use interstage::supervise::{Command, Mode};
 use interstage::tick::{CrossingRecord, Entry, Event, Telemetry};
 use interstage::units::{Direction as Course, MotorCommand};
 
-/// Both directions of a run.
 pub(crate) const DIRECTIONS: [Direction; 2] = [Direction::Deploy, Direction::Retract];
 
-/// Both rigs.
 pub(crate) const RIGS: [&str; 2] = ["prototype", "fe"];
 
 /// Largest gross slip of a run that counts as none, mm.
@@ -35,13 +33,11 @@ pub(crate) fn scenario(preset: &str, direction: Direction, seed: u64) -> Scenari
     scenario
 }
 
-/// A scenario of a preset with these overrides.
 pub(crate) fn overridden(preset: &str, sets: &[&str]) -> Scenario {
     let sets: Vec<String> = sets.iter().map(|set| (*set).to_owned()).collect();
     Scenario::resolve(Some(preset), None, &sets).expect("a sound scenario")
 }
 
-/// The opposite direction.
 pub(crate) fn opposite(direction: Direction) -> Direction {
     match direction {
         Direction::Deploy => Direction::Retract,
@@ -74,14 +70,11 @@ pub(crate) struct Moment {
     pub(crate) seen: Telemetry,
     /// The plant after the millisecond.
     pub(crate) truth: Truth,
-    /// Drive bridge.
     pub(crate) drive: MotorCommand,
-    /// Pre-tightener bridge.
     pub(crate) preload: MotorCommand,
 }
 
 impl Moment {
-    /// Both bridges off.
     pub(crate) fn is_off(&self) -> bool {
         !self.drive.enable && !self.preload.enable
     }
@@ -132,12 +125,10 @@ impl Bench {
         self.now()
     }
 
-    /// A millisecond.
     pub(crate) fn tick(&mut self) -> &Moment {
         self.spoiled(None, |_| {})
     }
 
-    /// A millisecond with a command.
     pub(crate) fn give(&mut self, command: Command) -> &Moment {
         self.spoiled(Some(command), |_| {})
     }
@@ -186,12 +177,10 @@ impl Bench {
         self.session.mode()
     }
 
-    /// True axial position, mm.
     pub(crate) fn position_mm(&self) -> f64 {
         self.session.plant().truth().position_mm
     }
 
-    /// Largest true preload so far, N.
     pub(crate) fn peak_preload_n(&self) -> f64 {
         self.moments.iter().map(|now| now.truth.preload_n).fold(0.0, f64::max)
     }

@@ -39,7 +39,6 @@ pub(crate) struct Line {
     pub(crate) outside: Vec<u64>,
     /// Largest error over the hidden value.
     pub(crate) worst_rel: f64,
-    /// Half-widths of the intervals.
     pub(crate) half_widths: Vec<f64>,
 }
 

@@ -9,13 +9,11 @@ use hil_sim::plant::ring::RingParameters;
 use hil_sim::scenario::Scenario;
 use interstage::rig::Rig;
 
-/// Control period, s.
 pub(crate) const TICK_S: f64 = 1e-3;
 
 /// Acceleration from rest, mm/s^2, as the controller's.
 const ACCELERATION_MM_S2: f64 = 250.0;
 
-/// The nominal plant of a preset.
 pub(crate) fn nominal(preset: &str) -> PlantParameters {
     Scenario::named(preset).unwrap().plant()
 }

@@ -22,7 +22,6 @@ const WRITE: &str = "INTERSTAGE_WRITE_FIXTURES";
 
 /// Runs with resets: this and their seed are their names.
 const RESETS: &str = "resets-";
-/// Their starts.
 const STARTS: u32 = 10;
 /// Longest time from one start to the next, ticks.
 const LONGEST: u32 = 3000;
@@ -50,7 +49,6 @@ fn names() -> BTreeSet<String> {
     names
 }
 
-/// The bytes of a recording.
 fn made(name: &str) -> Vec<u8> {
     let resolve = |sets: &[&str]| {
         let sets: Vec<String> = sets.iter().map(|set| (*set).to_owned()).collect();

@@ -10,7 +10,6 @@ use hil_sim::session::{Options, run};
 use interstage::fault::Fault;
 use interstage::supervise::{Command, Mode};
 
-/// The outcome of a run.
 #[derive(Debug)]
 struct Outcome {
     summary: Summary,
@@ -209,23 +208,18 @@ fn a_missing_step_is_searched_for_and_given_up() {
 /// driving onto the stow stop.
 #[test]
 fn a_retraction_that_starts_a_level_off_ends_safely() {
-    for (step, expected) in [
-        (1, None),
-        (2, Some(vec![Fault::LevelMismatch.code()])),
-        (3, Some(vec![Fault::LevelMismatch.code()])),
-    ] {
+    for step in 1..=3 {
         let scenario = with(Direction::Retract, StepAnomaly::Missing { step });
         let got = outcome(&scenario);
         let name = format!("step {step}");
         let peak = got.peak_preload_n;
         assert!(peak <= scenario.rig.preload.limit_n, "{name}: {peak} N");
-        let Some(expected) = expected else { continue };
-        let faults: Vec<u16> = got.summary.faults.iter().map(|fault| fault.code).collect();
-        assert_eq!(faults, expected, "{name}");
-        assert_eq!(got.summary.completed, expected.is_empty(), "{name}");
-        assert_safe(&got, &scenario, 0.06, &name);
-        let arrived = got.short_mm < 1.0;
-        assert!(!faults.is_empty() || arrived, "{name}: {} mm short", got.short_mm);
+        if step > 1 {
+            let faults: Vec<u16> = got.summary.faults.iter().map(|fault| fault.code).collect();
+            assert_eq!(faults, [Fault::LevelMismatch.code()], "{name}");
+            assert!(!got.summary.completed, "{name}");
+            assert_safe(&got, &scenario, 0.06, &name);
+        }
     }
 }
 

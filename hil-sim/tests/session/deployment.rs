@@ -15,7 +15,6 @@ use rayon::prelude::*;
 /// the measured preload, and three standard deviations of the sensor.
 const REACHED_PART: f64 = 0.035;
 
-/// A run and its scenario.
 struct Run {
     name: String,
     scenario: Scenario,

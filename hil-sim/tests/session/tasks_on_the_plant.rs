@@ -39,7 +39,6 @@ static CLOCK: Mutex<()> = Mutex::new(());
 
 /// Tasks are started a millisecond after boot, so that all wake first at the same even tick.
 const FIRST_TICK: u32 = 2;
-/// A control tick, s.
 const TICK_S: f64 = 1e-3;
 
 /// State that plant, peripherals and test share.

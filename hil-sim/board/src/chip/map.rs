@@ -20,7 +20,6 @@ pub(super) const RANGES: [(u32, u32); 6] = [
     (0xE004_2000, 0x1000),
 ];
 
-/// A block of registers.
 pub(super) struct Block {
     /// First address, and bytes.
     pub(super) base: u32,

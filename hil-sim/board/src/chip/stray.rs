@@ -22,7 +22,6 @@ pub struct Stray {
     pub write: bool,
     /// What is wrong with it.
     pub why: Why,
-    /// Number of accesses.
     pub count: u64,
     /// Program counter at the first.
     pub pc: u32,

@@ -330,7 +330,6 @@ fn name(register: Register) -> i32 {
 
 /// Every method fails if the engine refuses, as for an address without memory.
 impl<B: Bus + 'static> UnicornCore<B> {
-    /// Reads memory.
     pub fn read(&self, address: u32, into: &mut [u8]) -> Result<(), CoreError> {
         Ok(self.engine.mem_read(address.into(), into)?)
     }
@@ -347,7 +346,6 @@ impl<B: Bus + 'static> UnicornCore<B> {
         Ok(())
     }
 
-    /// A register's value.
     pub fn register(&self, register: Register) -> Result<u32, CoreError> {
         Ok(self.engine.reg_read(name(register))? as u32)
     }

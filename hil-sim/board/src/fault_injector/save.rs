@@ -9,7 +9,6 @@ use crate::peripherals::flash::Cut;
 /// Time after which a refused save is tried again, ms.
 const RETRY: u32 = 10;
 
-/// State of a save.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Saving {
     /// Requested; the board refuses, or has not answered yet.

@@ -19,7 +19,6 @@ impl Machine {
         Ok(places.position(|place| place == bytes).map(|at| FLASH.base + at as u32))
     }
 
-    /// A word of memory.
     pub fn word(&self, address: u32) -> Result<u32, CoreError> {
         let mut bytes = [0; 4];
         self.core.read(address, &mut bytes)?;
@@ -50,7 +49,6 @@ impl Machine {
         self.core.register(register)
     }
 
-    /// The program counter.
     pub const fn pc(&self) -> u32 {
         self.pc
     }

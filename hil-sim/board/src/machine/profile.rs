@@ -108,7 +108,6 @@ impl Profile {
         std::mem::take(&mut self.polls)
     }
 
-    /// Cycles asleep.
     pub const fn slept(&self) -> u64 {
         self.slept
     }

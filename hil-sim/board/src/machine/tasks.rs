@@ -60,7 +60,6 @@ impl Tasks {
         self.pools.partition_point(|(at, _)| *at <= pointer).checked_sub(1)
     }
 
-    /// Where polls begin.
     pub fn polls(&self) -> &[u32] {
         &self.polls
     }

@@ -149,7 +149,6 @@ impl Board {
         board
     }
 
-    /// Deploying.
     pub(crate) fn moving() -> Self {
         let mut board = Self::idle();
         board.send(b's');

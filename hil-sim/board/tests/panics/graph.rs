@@ -8,7 +8,6 @@ use rig_board::thumb;
 /// A branch out of a function.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Branch {
-    /// Its address.
     pub(super) from: u32,
     /// The function that it leads to; none if a register says where.
     pub(super) to: Option<usize>,

@@ -8,7 +8,6 @@ use super::names::Frame;
 
 use super::Site;
 
-/// Why.
 type Reason = &'static str;
 
 /// What a site looks like, and why it is never taken.

@@ -10,8 +10,7 @@ use cortex_m::peripheral::{NVIC, SCB};
 use cortex_m::{Peripherals, asm as op};
 use embassy_stm32::pac::Interrupt;
 
-use crate::assembly::{conditional, float_across};
-use crate::handlers::{BEATS, CALLS, NUMBER, note, order};
+use crate::program::{BEATS, CALLS, NUMBER, conditional, float_across, note, order};
 
 /// Their order is known to the host.
 pub(crate) const ALL: [fn() -> bool; 15] = [

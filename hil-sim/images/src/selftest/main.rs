@@ -4,11 +4,7 @@
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(target_os = "none")]
-mod assembly;
-#[cfg(target_os = "none")]
 mod checks;
-#[cfg(target_os = "none")]
-mod handlers;
 #[cfg(target_os = "none")]
 mod program;
 

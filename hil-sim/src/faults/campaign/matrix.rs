@@ -10,9 +10,7 @@ use super::{Case, Finding, Instant};
 /// Median and worst of a figure over the instants.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MedianAndWorst {
-    /// Median.
     pub median: f64,
-    /// Largest.
     pub worst: f64,
 }
 
@@ -28,7 +26,6 @@ impl MedianAndWorst {
 /// A fault at all its instants.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct MatrixRow {
-    /// The fault.
     pub fault: String,
     /// What happens, in words.
     pub text: String,
@@ -43,7 +40,6 @@ pub struct MatrixRow {
     pub detected: bool,
     /// Worst time from fault to report, ms; none if nothing was reported.
     pub latency_ms: Option<f64>,
-    /// Median of the same, ms.
     pub latency_median_ms: Option<f64>,
     /// From the report to rest with both bridges off, ms.
     pub rest_ms: Option<MedianAndWorst>,
@@ -57,14 +53,12 @@ pub struct MatrixRow {
     pub otherwise: usize,
     /// Instants tolerated without a report.
     pub tolerated: usize,
-    /// Instants undetected.
     pub undetected: usize,
     /// Instants at which a bound of the mechanism was exceeded.
     #[serde(rename = "unsafe")]
     pub unheld: usize,
     /// Ends of the runs and how often each occurred.
     pub ends: BTreeMap<Cow<'static, str>, usize>,
-    /// Largest preload, N.
     pub worst_preload_n: f64,
     /// Longest distance moved uncommanded, mm.
     pub worst_motion_mm: f64,

@@ -75,7 +75,6 @@ impl Twin {
 /// Ticks that the drive rests at the far end.
 const DWELL_TICKS: u32 = 100;
 
-/// The operator.
 #[derive(Clone, Debug, Default)]
 pub struct Operator {
     started: bool,

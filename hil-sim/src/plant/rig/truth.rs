@@ -49,22 +49,10 @@ fn away(x: f64, y: f64) -> f64 {
 pub enum PlantError {
     /// No height of the wheel balances the radial forces.
     #[error("plant at {time_s:.3} s, {position_mm:.3} mm: {source}")]
-    Balance {
-        /// When, s.
-        time_s: f64,
-        /// Where, mm.
-        position_mm: f64,
-        /// Why.
-        source: BalanceError,
-    },
+    Balance { time_s: f64, position_mm: f64, source: BalanceError },
     /// A state is not a number.
     #[error("plant at {time_s:.3} s: {name} is not finite")]
-    NotFinite {
-        /// When, s.
-        time_s: f64,
-        /// Which state.
-        name: &'static str,
-    },
+    NotFinite { time_s: f64, name: &'static str },
 }
 
 impl VirtualRig {

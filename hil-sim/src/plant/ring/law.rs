@@ -57,7 +57,6 @@ impl Branch {
 /// Christensen 1982, 1.4).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Law {
-    /// Step, s.
     pub(super) dt_s: f64,
     pub(super) k_inf: f64,
     /// k_0 - k_inf, N/mm^3, of all relaxations together.

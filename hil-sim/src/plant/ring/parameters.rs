@@ -7,7 +7,6 @@ use interstage::rig::Rig;
 pub struct RingParameters {
     /// Undeformed radius, mm.
     pub radius_mm: f64,
-    /// Width, mm.
     pub width_mm: f64,
     /// Relaxed stiffness per area, N/mm^3 (1e9 Pa/m).
     pub k_inf: f64,
@@ -54,7 +53,6 @@ impl RingParameters {
         self.tread_thickness_mm > 0.0
     }
 
-    /// Whether the rubber relaxes twice.
     pub fn relaxes_twice(&self) -> bool {
         self.second_relaxation > 1.0
     }

@@ -68,7 +68,6 @@ fn marks(items: &[Item]) -> Vec<Mark> {
     items.iter().filter_map(mark).collect()
 }
 
-/// The bytes that the items have.
 fn bytes_of(items: &[Item]) -> Vec<u8> {
     let bytes = |item: &Item| match item {
         Item::Frame(bytes) => bytes.clone(),

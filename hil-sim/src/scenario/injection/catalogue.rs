@@ -11,15 +11,11 @@ use crate::plant::sensors::{MORE, SENSORS};
 /// A fault that a scenario can name.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Entry {
-    /// What breaks.
     pub target: Target,
-    /// How.
     pub kind: Kind,
-    /// Default magnitude.
     pub magnitude: f64,
     /// Least and largest magnitude of a scenario; equal where there is none.
     pub range: (f64, f64),
-    /// Unit of the magnitude.
     pub unit: &'static str,
     /// What happens.
     pub text: &'static str,

@@ -33,7 +33,6 @@ pub struct Cost {
 /// Textbook cycles of the control tick over a deployment and a retraction.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Tick {
-    /// Mean of all ticks.
     pub mean: f64,
     /// The costliest tick.
     pub worst: u64,
@@ -55,7 +54,6 @@ pub struct Firmware {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct WithWaits {
     pub mean: f64,
-    /// Most.
     pub worst: u64,
 }
 

@@ -32,7 +32,6 @@ pub struct Setting {
     pub seconds: f64,
 }
 
-/// The comparison.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Peers {
     /// Versions of SciPy and MuJoCo.
@@ -44,7 +43,6 @@ pub struct Peers {
 }
 
 impl Peers {
-    /// The stored comparison.
     pub fn stored() -> Result<Self> {
         Ok(serde_json::from_str(include_str!("../../peers/results.json"))?)
     }

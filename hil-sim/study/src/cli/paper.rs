@@ -2,13 +2,11 @@
 
 use std::path::PathBuf;
 
-use serde::Serialize;
-
 use super::{docs, failed, write};
 use crate::figure_svg::svg;
 use crate::paper::{self, Study, page};
 use hil_sim::cli::failure::{Failure, Outcome};
-use hil_sim::cli::output;
+use hil_sim::cli::output::{self, WithFiles};
 use hil_sim::progress;
 use hil_sim::table::plain;
 
@@ -28,14 +26,6 @@ pub(super) struct Args {
     json: bool,
 }
 
-/// What `--json` prints.
-#[derive(Serialize)]
-struct Printed<'a> {
-    #[serde(flatten)]
-    study: &'a Study,
-    files: &'a [PathBuf],
-}
-
 pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     let directory = args.out.clone().unwrap_or_else(|| docs().join("paper"));
     // A directory that cannot be made is reported before the runs.
@@ -50,7 +40,8 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     files.push(("README.md", page::markdown(&study)));
     files.push(("paper.json", paper::json(&study).map_err(Failure::run)? + "\n"));
     let files = write(&directory, files)?;
-    output::result(args.json, &Printed { study: &study, files: &files }, || human(&study, &files))?;
+    let printed = WithFiles { result: &study, files: &files };
+    output::result(args.json, &printed, || human(&study, &files))?;
     Ok(Outcome::Good)
 }
 

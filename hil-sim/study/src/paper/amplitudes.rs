@@ -49,7 +49,6 @@ impl Three {
     }
 }
 
-/// The three cases.
 #[derive(Clone, Debug)]
 pub struct Amplitudes {
     cases: Vec<Three>,
@@ -167,7 +166,6 @@ impl Amplitudes {
     }
 }
 
-/// The claims of both.
 #[rustfmt::skip]
 pub fn claims(amplitudes: &Amplitudes, all: &[Histories]) -> Vec<Claim> {
     let [slow, pressed, fast, _] = cases();

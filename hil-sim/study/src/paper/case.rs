@@ -7,7 +7,6 @@ use crate::reference::vibration::{self, MODES, Modal};
 use hil_sim::plant::arm::Arm;
 use hil_sim::scenario::{ControllerKind, Scenario};
 
-/// Loads of the study.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Loads {
     /// Of its theory and finite elements: 60 N on top, 100 N and more of preload.
@@ -37,7 +36,6 @@ pub struct Case {
 }
 
 impl Case {
-    /// A case.
     pub const fn new(loads: Loads, speed_mm_s: f64, preload_n: f64) -> Self {
         Self { loads, speed_mm_s, preload_n }
     }

@@ -17,7 +17,6 @@ const GONE: f64 = 0.02;
 /// Two forces no farther apart than this, relative, are nearly identical.
 const NEARLY: f64 = 0.03;
 
-/// The study's four cases.
 pub fn cases() -> [Case; 4] {
     CASES.map(|(speed, preload)| Case::new(Loads::Fe, speed, preload))
 }
@@ -38,7 +37,6 @@ pub fn figure(all: &[Histories]) -> Figure {
     Figure::new("fig11", title, caption, CASES.len(), panels)
 }
 
-/// The claims about it.
 #[rustfmt::skip]
 pub fn claims(all: &[Histories]) -> Vec<Claim> {
     let all @ [slow, pressed, fast, slowest]: [&Histories; 4] = std::array::from_fn(|i| &all[i]);

@@ -62,7 +62,6 @@ pub struct Run {
     pub separation_mm: f64,
     /// Contact stages that the controller went through, 1 to 6.
     pub stages: [bool; 6],
-    /// Gross slip, mm.
     pub slip_mm: f64,
 }
 

@@ -36,7 +36,6 @@ const COARSE: (usize, f64) = (1440, 0.02);
 const INTRODUCED: &str = "Analysis of inter-stage transition state";
 const DISCUSSED: &str = "Analysis and discussion of test results";
 
-/// Holding the gap.
 #[derive(Clone, Debug)]
 pub struct Hold {
     /// Preload that holds the gap of the safe point against speed: theory, simulation.

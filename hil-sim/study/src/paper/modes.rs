@@ -119,7 +119,6 @@ impl Modes {
     }
 }
 
-/// The claims about it.
 #[rustfmt::skip]
 pub fn claims(modes: &Modes) -> Vec<Claim> {
     let (constrained, free) = (modes.constrained[1].1, modes.free[1].1);

@@ -28,7 +28,6 @@ const NOT_JUDGED: [(&str, &str); 4] = [
     ),
 ];
 
-/// The page as Markdown.
 pub fn markdown(study: &Study) -> String {
     let held = study.claims.iter().filter(|claim| claim.holds).count();
     let fitted = study.claims.iter().filter(|claim| claim.holds && claim.fitted).count();

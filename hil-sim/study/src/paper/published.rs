@@ -11,7 +11,6 @@ pub const COLLISION_N: [f64; 3] = [56.5261, 51.2358, 58.5963];
 /// doubtful, so that only ratios are used.
 pub const STRESS: [f64; 3] = [66.7738, 63.6418, 69.3387];
 
-/// Least useful speed, mm/s.
 pub const LEAST_SPEED_MM_S: f64 = 2.9741;
 
 /// Least preload with which the drive works under its top load, N.

@@ -138,7 +138,6 @@ impl Curves {
 
 #[derive(Clone, Debug)]
 pub struct Sweep {
-    /// What is swept.
     pub variable: Variable,
     /// Gap, mm.
     pub gap: Curves,

@@ -37,7 +37,6 @@ pub fn figure(all: &[Histories]) -> Figure {
     Figure::new("fig24", title, caption, CASES.len(), panels(all))
 }
 
-/// The claims about it.
 #[rustfmt::skip]
 pub fn claims(all: &[Histories]) -> Vec<Claim> {
     let all @ [_, _, fast, _]: [&Histories; 4] = std::array::from_fn(|i| &all[i]);

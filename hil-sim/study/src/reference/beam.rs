@@ -40,7 +40,6 @@ pub const SPRING_RATIOS: (f64, f64) = (1e-6, 1e12);
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{argument} is {value}, expected {expected}")]
 pub struct BeamError {
-    /// Name of the argument.
     pub argument: &'static str,
     /// What was given, in the unit of the argument's name.
     pub value: f64,
@@ -74,13 +73,11 @@ impl Ends {
 /// What end B carries. The default is nothing.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Tip {
-    /// Point mass, kg.
     pub mass_kg: f64,
     /// Spring to ground across the beam, N/m.
     pub spring_n_per_m: f64,
 }
 
-/// One natural mode.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mode {
     /// Wave number times length, dimensionless.
@@ -92,7 +89,6 @@ pub struct Mode {
 /// A uniform beam of rectangular section.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Beam {
-    /// Length, m.
     pub length_m: f64,
     /// Young's modulus, Pa.
     pub e_pa: f64,
@@ -121,7 +117,6 @@ impl Beam {
         }
     }
 
-    /// Mass of the beam, kg.
     pub fn mass_kg(&self) -> f64 {
         self.rho_kg_m3 * self.width_m * self.height_m * self.length_m
     }
@@ -178,7 +173,6 @@ impl Beam {
         Ok(ratio * self.mass_kg())
     }
 
-    /// The mode of a root.
     fn mode(&self, beta_l: f64) -> Mode {
         Mode { beta_l, frequency_hz: beta_l * beta_l * self.frequency_scale_hz() }
     }

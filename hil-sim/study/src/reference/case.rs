@@ -6,14 +6,14 @@ use hil_sim::plant::balance::{Axial, Balance, BalanceError};
 use hil_sim::plant::crossing::{CrossingCase, CrossingResult, cross};
 use hil_sim::plant::ring::RingParameters;
 
-/// How finely a crossing is resolved.
+/// How finely a crossing is resolved. How near that is to the converged one, the tests of the
+/// plant's crossing show, which is the same ring.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Resolution {
     /// Elements around the ring.
     pub elements: usize,
     /// Longest axial travel per step, mm.
     pub stride_mm: f64,
-    /// Longest step of time, s.
     pub step_s: f64,
 }
 
@@ -36,7 +36,6 @@ pub struct ReferenceCase {
     /// Frictionless ([`Axial::Pushed`], to which the tread is fitted), or driven by
     /// torque against the part of the top load that this wheel lifts.
     pub axial: Axial,
-    /// How finely.
     pub resolution: Resolution,
 }
 

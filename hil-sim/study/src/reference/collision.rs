@@ -171,7 +171,6 @@ struct Mass {
 }
 
 impl Mass {
-    /// At rest at `y_mm`, in balance.
     fn at_rest(case: &ReferenceCase, y_mm: f64) -> Self {
         let (balance, mass_kg) = (case.balance(), case.rig.plant.moved_mass_kg);
         Self { balance, mass_kg, y_mm, rate_mm_s: 0.0, acceleration_mm_s2: 0.0 }

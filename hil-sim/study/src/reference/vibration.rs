@@ -37,9 +37,7 @@ const SAMPLE_S: f64 = 1e-3;
 /// The drive arm, clamped at the pillar, with what is at the wheel as a point mass.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Arm {
-    /// The arm itself.
     pub beam: Beam,
-    /// Mass at its tip.
     pub tip: Tip,
     /// Angle between arm and pillar, rad, with the wheel on the outermost wall.
     pub angle_rad: f64,
@@ -154,7 +152,6 @@ impl Modal {
         Self { oscillators, compliance, rest_compliance: compliance - held, force_n: 0.0 }
     }
 
-    /// Sets it at rest under `force_n`.
     pub fn rest(&mut self, force_n: f64) {
         self.force_n = force_n;
         for oscillator in &mut self.oscillators {
@@ -174,7 +171,6 @@ impl Modal {
         self.force_n = force_n;
     }
 
-    /// Deflection of the tip, m.
     pub fn deflection_m(&self) -> f64 {
         let modes: f64 = self.oscillators.iter().map(|o| o.gain * o.state.0).sum();
         modes + self.rest_compliance * self.force_n

@@ -147,7 +147,6 @@ impl Count {
         *self.deferred.get(address.wrapping_sub(self.base) as usize / 2)?
     }
 
-    /// Adds cycles.
     pub(super) fn spend(&mut self, cycles: u64) {
         self.meter.cycles += cycles;
     }

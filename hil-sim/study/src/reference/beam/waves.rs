@@ -98,7 +98,6 @@ impl Load {
         numerator / self.denominator()
     }
 
-    /// The denominator of [`Self::reflection`].
     fn denominator(self) -> Complex<f64> {
         c(self.shear - 2.0 * self.deflection, -self.shear)
     }

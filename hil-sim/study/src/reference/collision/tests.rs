@@ -34,7 +34,6 @@ struct Forces {
 }
 
 impl Forces {
-    /// Away from the wall, N.
     fn radial_n(&self) -> f64 {
         self.floor_n + self.step_n
     }
@@ -163,21 +162,6 @@ fn finer_rings_come_closer_to_the_closed_form() {
     };
     let (few, more, many) = (error(720), error(1440), error(5760));
     assert!(few < 2e-3 && more < 5e-4 && many < 5e-5, "{few} {more} {many}");
-}
-
-#[test]
-fn the_two_resolutions_are_converged() {
-    let at = |elements: usize| {
-        let resolution = Resolution { elements, stride_mm: 28.8 / elements as f64, step_s: 1e-4 };
-        let crossing = ReferenceCase { resolution, ..ReferenceCase::first() }.still().unwrap();
-        [crossing.gap_mm, crossing.corner_force_n]
-    };
-    let (history, figure, finest) = (at(2880), at(5760), at(11520));
-    for index in 0..2 {
-        assert!((history[index] / finest[index] - 1.0).abs() < 1e-3, "{history:?} {finest:?}");
-        assert!((figure[index] / finest[index] - 1.0).abs() < 2e-4, "{figure:?} {finest:?}");
-    }
-    assert_eq!(28.8 / 5760.0, Resolution::FIGURE.stride_mm);
 }
 
 #[test]

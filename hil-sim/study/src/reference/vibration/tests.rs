@@ -93,7 +93,6 @@ fn history(speed_mm_s: f64) -> (Vec<Bending>, f64) {
     (bending(&case, &crossing).unwrap(), climb * arm().compliance_m_per_n() * 1e3)
 }
 
-/// Largest vibration before this time, mm.
 fn shaken(history: &[Bending], before_s: f64) -> f64 {
     let climbing = history.iter().filter(|now| now.t_s < before_s);
     climbing.map(|now| now.vibration_mm.abs()).fold(0.0, f64::max)
