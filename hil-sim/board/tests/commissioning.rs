@@ -132,7 +132,7 @@ fn commission(seed: u64) -> (Vec<String>, Vec<String>) {
         return (Vec::new(), vec![format!("{failed:?}")]);
     }
     let mut mine = progress.proposed;
-    assert_eq!(mine.sources.len(), 3, "{:?}", mine.sources);
+    assert_eq!(mine.sources.len(), 6, "{:?}", mine.sources);
     // Three deployments.
     let mut at = board(&hidden, None);
     let usual = mine.rig.preload.cruise_n;
