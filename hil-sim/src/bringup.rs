@@ -2,22 +2,24 @@
 //!
 //! Stage by stage: what can be judged at rest comes first, then the emergency stop, then motion
 //! in the firmware's service mode, which has the bounds. A stage with a check that fails is the
-//! last. Every check has its line in [`CHECKS`]; what a failed one advises is beside its
+//! last. Every check has its line in [`GATES`]; what a failed one advises is beside its
 //! measurement.
 
 mod drive;
 mod figures;
+pub mod gates;
 mod line;
 mod motion;
 mod operate;
 mod operator;
 mod page;
 mod pretightener;
+mod pull;
+mod reference;
 mod rest;
 mod state;
 mod stop;
 
-use Stage::{Board, Drive, Pretightener, Sensors, Stop};
 use serde::{Deserialize, Serialize};
 
 use crate::probe::PortError;
@@ -32,7 +34,7 @@ pub use state::Progress;
 
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Check {
-    /// Its name in [`CHECKS`].
+    /// Its name in [`GATES`].
     pub name: String,
     /// Passed.
     pub ok: bool,
@@ -44,107 +46,119 @@ pub struct Check {
     pub advice: String,
 }
 
-/// A part of the power-up; the next one begins when all its checks have passed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Stage {
-    /// The board alone.
-    Board,
-    /// Sensors at rest.
-    Sensors,
-    /// Emergency stop and reset.
-    Stop,
+type Run = fn(&mut Session<'_, '_>) -> Result<Vec<Check>, BringupError>;
+
+/// A stage and what it checks.
+pub struct Gate {
+    pub stage: Stage,
+    pub name: &'static str,
+    /// What makes its checks; none if logs do.
+    run: Option<Run>,
+    /// Each check in its order: its name, what is done, and what a sound rig shows.
+    pub checks: &'static [[&'static str; 3]],
+}
+
+/// Declares the gates: stage, name and what makes its checks; then a row for each check.
+macro_rules! gates {
+    ($($(#[$about:meta])* $stage:ident $name:literal, $run:expr =>
+        $($check:literal | $does:literal | $expected:literal)*;)*) => {
+        /// A part of the way from wiring to a trusted run; the next one begins when all its checks
+        /// have passed.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+        #[serde(rename_all = "snake_case")]
+        pub enum Stage { $($(#[$about])* $stage,)* }
+
+        /// Every gate, in its order.
+        pub const GATES: &[Gate] = &[$(Gate {
+            stage: Stage::$stage,
+            name: $name,
+            run: $run,
+            checks: &[$([$check, $does, $expected]),*],
+        }),*];
+    };
+}
+
+gates! {
+    Board "board", Some(rest::board) =>
+        "option bytes" | "reads FLASH_OPTR" | "DBANK = 1, as delivered"
+        "firmware" | "reads the binary log for 0.5 s" | "a tick each millisecond"
+        "stop contact" | "reads PB12 and PB7" | "both low: closed"
+        "readback at rest" | "reads both bridges" | "0 % of the supply, 3 % at most";
+    Sensors "sensors at rest", Some(rest::sensors) =>
+        "encoder at rest" | "counts for 0.5 s" | "2 counts at most"
+        "preload sensor" | "reads it unloaded" | "0 N, 3 N at most"
+        "preload noise" | "reads it for 0.5 s" | "0.2 N at most, one sigma"
+        "compression sensor" | "reads it unloaded" | "0 mm, 0.1 mm at most"
+        "compression noise" | "reads it for 0.5 s" | "0.008 mm at most, one sigma"
+        "angle sensor" | "reads its frames" | "sound frames, field in range"
+        "angle zero" | "compares it with the stow end" | "within 40 codes"
+        "preload lead" | "you unplug the sensor" | "below 2 % of the converter"
+        "compression lead" | "you unplug the sensor" | "below 2 % of the converter"
+        "self-test" | "resets the controller" | "idle, zeros taken";
+    Stop "emergency stop", Some(stop::run) =>
+        "stop pressed" | "you press the emergency stop" | "fault 151"
+        "stop cuts supply" | "you look at the supply" | "the motors have no supply"
+        "held in reset" | "you hold the board's reset button" | "nothing moves";
     /// The drive, wheel free.
-    Drive,
-    /// The pre-tightener.
-    Pretightener,
+    Drive "drive", Some(drive::drive) =>
+        "drive bridge" | "15 % for 0.6 s, readback" | "15 %, the other bridge 0"
+        "drive turns" | "15 % outwards, the encoder" | "counts upwards"
+        "drive direction" | "you look at the wheel" | "it turns outwards"
+        "drive speed" | "15 % and 30 %" | "its parameter, within 25 %"
+        "drive friction" | "the same" | "less than 8 % of duty";
+    Pretightener "pre-tightener", Some(pretightener::pretightener) =>
+        "pre-tightener bridge" | "25 % for 0.55 s, readback" | "25 %, the other bridge 0"
+        "preload rises" | "the same" | "preload and compression rise"
+        "preload against tread" | "three steps" | "compression grows less than the preload"
+        "arm direction" | "the same" | "the angle's code grows"
+        "preload scale" | "the same" | "as spring 25 %, as tread 50 %"
+        "preload released" | "backwards until slack" | "below 2 N, then idle";
+    /// Weights on the preload sensor.
+    Weights "weights", Some(|session| reference::run(session, &reference::WEIGHT)) =>
+        "weight direction" | "you hang two weights" | "the preload grows"
+        "weights agree" | "the same, and off" | "within 2 %, zero as before"
+        "weight scale" | "the same" | "its parameter, within 5 %";
+    /// Gauges under the compression sensor.
+    Compression "compression", Some(|session| reference::run(session, &reference::GAUGE)) =>
+        "gauge direction" | "you put in two gauges" | "the compression grows"
+        "gauges agree" | "the same, and out" | "within 2 %, zero as before"
+        "gauge scale" | "the same" | "its parameter, within 5 %";
+    Friction "friction", Some(pull::run) =>
+        "pull holds" | "pressed at the stop, a small duty" | "the tread stands"
+        "pull slips" | "30 % against the stop" | "10 to 97 % of its free speed"
+        "friction" | "the same" | "0.3 to 1.6";
+    /// A deployment at the least speed, by its log.
+    Crossing "first crossing", None =>
+        "first crossing" | "`rig bringup --log` of it" | "every step at 5 mm/s, no fault, no slip";
+    Identification "identification", None =>
+        "identified" | "`rig identify --out` this folder" | "tread and friction by 95 %";
+    Acceptance "acceptance", None =>
+        "accepted" | "`rig accept --out` this folder" | "accepted";
 }
 
 impl Stage {
-    /// Every stage, in its order.
-    pub const ALL: [Self; 5] = [Board, Sensors, Stop, Drive, Pretightener];
+    fn gate(self) -> &'static Gate {
+        &GATES[self as usize]
+    }
 
     /// In words.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Board => "board",
-            Self::Sensors => "sensors at rest",
-            Self::Stop => "emergency stop",
-            Self::Drive => "drive",
-            Self::Pretightener => "pre-tightener",
-        }
+    pub fn name(self) -> &'static str {
+        self.gate().name
+    }
+
+    /// Whether logs prove it, and not the first power-up itself.
+    pub fn is_by_logs(self) -> bool {
+        self.gate().run.is_none()
     }
 }
-
-/// What there is to know of a check.
-#[derive(Clone, Copy, Debug)]
-pub struct CheckInfo {
-    pub name: &'static str,
-    pub stage: Stage,
-    /// What is done.
-    pub does: &'static str,
-    /// What a sound rig shows.
-    pub expected: &'static str,
-}
-
-const fn info(
-    name: &'static str,
-    stage: Stage,
-    does: &'static str,
-    expected: &'static str,
-) -> CheckInfo {
-    CheckInfo { name, stage, does, expected }
-}
-
-/// Every check, in its order.
-pub const CHECKS: &[CheckInfo] = &[
-    info("option bytes", Board, "reads FLASH_OPTR", "DBANK = 1, as delivered"),
-    info("firmware", Board, "reads the binary log for 0.5 s", "a tick each millisecond"),
-    info("stop contact", Board, "reads PB12 and PB7", "both low: closed"),
-    info("readback at rest", Board, "reads both bridges", "0 % of the supply, 3 % at most"),
-    info("encoder at rest", Sensors, "counts for 0.5 s", "2 counts at most"),
-    info("preload sensor", Sensors, "reads it unloaded", "0 N, 3 N at most"),
-    info("preload noise", Sensors, "reads it for 0.5 s", "0.2 N at most, one sigma"),
-    info("compression sensor", Sensors, "reads it unloaded", "0 mm, 0.1 mm at most"),
-    info("compression noise", Sensors, "reads it for 0.5 s", "0.008 mm at most, one sigma"),
-    info("angle sensor", Sensors, "reads its frames", "sound frames, field in range"),
-    info("angle zero", Sensors, "compares it with the stow end", "within 40 codes"),
-    info("preload lead", Sensors, "you unplug the sensor", "below 2 % of the converter"),
-    info("compression lead", Sensors, "you unplug the sensor", "below 2 % of the converter"),
-    info("self-test", Sensors, "resets the controller", "idle, zeros taken"),
-    info("stop pressed", Stop, "you press the emergency stop", "fault 151"),
-    info("stop cuts supply", Stop, "you look at the supply", "the motors have no supply"),
-    info("held in reset", Stop, "you hold the board's reset button", "nothing moves"),
-    info("drive bridge", Drive, "15 % for 0.6 s, readback", "15 %, the other bridge 0"),
-    info("drive turns", Drive, "15 % outwards, the encoder", "counts upwards"),
-    info("drive direction", Drive, "you look at the wheel", "it turns outwards"),
-    info("drive speed", Drive, "15 % and 30 %", "its parameter, within 25 %"),
-    info("drive friction", Drive, "the same", "less than 8 % of duty"),
-    info(
-        "pre-tightener bridge",
-        Pretightener,
-        "25 % for 0.55 s, readback",
-        "25 %, the other bridge 0",
-    ),
-    info("preload rises", Pretightener, "the same", "preload and compression rise"),
-    info(
-        "preload against tread",
-        Pretightener,
-        "three steps",
-        "compression grows less than the preload",
-    ),
-    info("arm direction", Pretightener, "the same", "the angle's code grows"),
-    info("preload scale", Pretightener, "the same", "as spring 25 %, as tread 50 %"),
-    info("preload released", Pretightener, "backwards until slack", "below 2 N, then idle"),
-];
 
 /// A check of this name.
 ///
 /// # Panics
-/// If [`CHECKS`] lacks it.
+/// If no gate has it.
 fn check(name: &str, ok: bool, measured: String, advice: &str) -> Check {
-    let info = CHECKS.iter().find(|info| info.name == name);
-    let expected = info.unwrap_or_else(|| panic!("no check {name}")).expected.to_owned();
+    let row = GATES.iter().flat_map(|gate| gate.checks).find(|[known, ..]| *known == name);
+    let expected = row.unwrap_or_else(|| panic!("no check {name}"))[2].to_owned();
     let advice = if ok { String::new() } else { advice.to_owned() };
     Check { name: name.to_owned(), ok, measured, expected, advice }
 }
@@ -182,10 +196,10 @@ pub(crate) struct Session<'a, 'p> {
 
 impl Session<'_, '_> {
     /// A value that was measured, with half the width of its interval.
-    pub(crate) fn measured(&mut self, key: &str, value: f64, within: f64) {
+    pub(crate) fn measured(&mut self, key: &str, value: f64, within: f64, by: &str) {
         let digits = (1.0 - within.log10().floor()).clamp(0.0, 4.0) as usize;
         let (low, high) = (value - within, value + within);
-        let source = format!("{low:.digits$} to {high:.digits$}, first power-up");
+        let source = format!("{low:.digits$} to {high:.digits$}, first power-up, by {by}");
         self.proposed.sources.insert(key.to_owned(), source);
     }
 }
@@ -207,12 +221,13 @@ pub fn run(
 ) -> Result<(), BringupError> {
     let expected = progress.expected.clone();
     let mut supplied = false;
-    for stage in Stage::ALL {
+    for &Gate { stage, name, run, .. } in GATES {
+        let Some(run) = run else { continue };
         if progress.is_done(stage) {
-            say(&format!("{}: passed before", stage.name()));
+            say(&format!("{name}: passed before"));
             continue;
         }
-        say(&format!("{}:", stage.name()));
+        say(&format!("{name}:"));
         if !matches!(stage, Stage::Board | Stage::Sensors) && !supplied {
             operator.act(Action::SwitchOn)?;
             // Where stages were passed before, the board has just started.
@@ -222,14 +237,7 @@ pub fn run(
         let mut proposed = progress.proposed.clone();
         let session =
             &mut Session { line, operator, expected: &expected, proposed: &mut proposed, say };
-        let checks = match stage {
-            Stage::Board => rest::board(session),
-            Stage::Sensors => rest::sensors(session),
-            Stage::Stop => stop::run(session),
-            Stage::Drive => drive::drive(session),
-            Stage::Pretightener => pretightener::pretightener(session),
-        };
-        let checks = match checks {
+        let checks = match run(session) {
             Ok(checks) => checks,
             Err(error) => {
                 line.leave();
@@ -265,8 +273,10 @@ mod tests {
     #[test]
     fn the_manual_has_each_check_with_what_is_done_and_expected() {
         let page = include_str!("../../docs/HARDWARE.md");
-        for CheckInfo { name, stage, does, expected } in CHECKS {
-            let row = format!("| {} | {name} | {does} | {expected} |", stage.name());
+        for (Gate { name: stage, .. }, [name, does, expected]) in
+            GATES.iter().flat_map(|gate| gate.checks.iter().map(move |check| (gate, check)))
+        {
+            let row = format!("| {stage} | {name} | {does} | {expected} |");
             assert!(page.contains(&row), "{row}");
         }
     }

@@ -4,7 +4,7 @@ use std::cell::RefCell;
 use std::rc::Rc;
 use std::time::Duration;
 
-use hil_sim::bringup::{Action, BringupError, Operator, Question, Seen};
+use hil_sim::bringup::{Action, BringupError, Operator, Question, Seen, Sensor};
 use hil_sim::probe::{Port, PortError};
 
 use super::bench::Bench;
@@ -14,6 +14,10 @@ use super::port::gone;
 const SEEN_MM: f64 = 0.5;
 /// Time for which a hand holds the reset button, ms.
 const RESET_MS: u32 = 300;
+
+/// What is written on the two weights, N, and gauges, mm, and what they are.
+const WEIGHTS: [(f64, f64); 2] = [(5.0, 5.01), (15.0, 14.96)];
+const GAUGES: [(f64, f64); 2] = [(1.0, 1.003), (3.0, 2.996)];
 
 /// A bench with a probe at its board and a person beside it.
 pub struct Attended<'a> {
@@ -85,6 +89,8 @@ impl<O: Operator> Operator for Person<'_, O> {
             Action::ReleaseStop => wiring.stop_pressed = false,
             Action::Unplug(sensor) => wiring.unplugged.push(sensor),
             Action::Plug(sensor) => wiring.unplugged.retain(|known| *known != sensor),
+            Action::LiftOff | Action::TakeOff(Sensor::Preload) => bench.plant.hang(0.0),
+            Action::TakeOff(Sensor::Compression) => bench.plant.gauge(None),
             Action::HoldReset => bench.hold_reset(RESET_MS).map_err(gone)?,
         }
         bench.connect();
@@ -108,5 +114,15 @@ impl<O: Operator> Operator for Person<'_, O> {
             Question::Supplied if bench.wiring.is_supplied() => Seen::Yes,
             Question::Supplied => Seen::Nothing,
         })
+    }
+
+    fn put(&mut self, sensor: Sensor, is_second: bool) -> Result<f64, BringupError> {
+        let (plant, which) = (&mut self.bench.borrow_mut().plant, usize::from(is_second));
+        if sensor == Sensor::Preload {
+            plant.hang(WEIGHTS[which].1);
+            return Ok(WEIGHTS[which].0);
+        }
+        plant.gauge(Some(GAUGES[which].1));
+        Ok(GAUGES[which].0)
     }
 }

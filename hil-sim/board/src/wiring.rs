@@ -15,6 +15,16 @@ use super::chip::{Chip, Pin};
 const ZERO: i32 = 3277;
 /// Code of an open input whose pull-down is missing: it keeps some charge.
 const FLOATING: u16 = 21_000;
+/// What a sensor shows of its quantity, in percent.
+const GAINS: [(Mistake, i32); 5] = [
+    (Mistake::PreloadReversed, -100),
+    (Mistake::CompressionReversed, -100),
+    (Mistake::PreloadGain, 150),
+    (Mistake::PreloadScale, 110),
+    (Mistake::CompressionScale, 90),
+];
+/// Code of a preload sensor at its stop: 13 N of 200 N.
+const PRELOAD_STOP: i32 = ZERO + 3621;
 /// By how much the angle's zero code is off, codes.
 const ANGLE_OFF: i32 = 900;
 /// Friction of a wheel that cannot be turned, N.
@@ -72,6 +82,14 @@ pub enum Mistake {
     StopSupply,
     /// The preload sensor shows 1.5 times the preload.
     PreloadGain,
+    /// It shows a tenth too much.
+    PreloadScale,
+    /// The carriage has no stop at the stow end.
+    NoStop,
+    /// It is at its stop at 13 N.
+    PreloadStop,
+    /// The compression sensor shows a tenth too little.
+    CompressionScale,
     /// The preload sensor has ten times its noise.
     PreloadNoise,
     /// The compression sensor has ten times its noise.
@@ -116,6 +134,9 @@ impl Wiring {
         }
         if self.has(Mistake::CompressionNoise) {
             plant.sensors.noise.compression_sensor_mm *= 10.0;
+        }
+        if self.has(Mistake::NoStop) {
+            plant.stops_mm.0 = -1e3;
         }
         if self.has(Mistake::WheelBlocked) {
             plant.drive.friction_n = BLOCKED_N;
@@ -170,14 +191,14 @@ impl Wiring {
         *arm = self.arm(*arm);
         let places = [SensorId::PreloadSensor, SensorId::CompressionSensor].map(|s| s as usize);
         let [mut preload, mut compression] = places.map(|at| i32::from(codes.sensors[at]));
-        if self.has(Mistake::PreloadReversed) {
-            preload = 2 * ZERO - preload;
+        for (mistake, percent) in GAINS.into_iter().filter(|(mistake, _)| self.has(*mistake)) {
+            let is_compression =
+                matches!(mistake, Mistake::CompressionReversed | Mistake::CompressionScale);
+            let code = if is_compression { &mut compression } else { &mut preload };
+            *code = ZERO + (*code - ZERO) * percent / 100;
         }
-        if self.has(Mistake::CompressionReversed) {
-            compression = 2 * ZERO - compression;
-        }
-        if self.has(Mistake::PreloadGain) {
-            preload = ZERO + (preload - ZERO) * 3 / 2;
+        if self.has(Mistake::PreloadStop) {
+            preload = preload.min(PRELOAD_STOP);
         }
         if self.has(Mistake::PreloadOpen) || self.unplugged.contains(&Sensor::Preload) {
             let floats = self.has(Mistake::PreloadPullDown);

@@ -25,19 +25,19 @@ use crate::common::{Board, OnUsb, elf, strings};
 
 /// The power-up of a board with these mistakes, every motion allowed.
 fn power_up(mistakes: &[Mistake]) -> Progress {
-    power_up_over(mistakes, |board| board)
+    power_up_over(mistakes, &Scenario::default(), |board| board)
 }
 
 /// The same over this port to the board.
 fn power_up_over<P: Port>(
     mistakes: &[Mistake],
+    scenario: &Scenario,
     port: impl FnOnce(Attended<'static>) -> P,
 ) -> Progress {
-    let scenario = Scenario::default();
-    let bench = Bench::wired(elf(), strings(), &scenario, mistakes).expect("a bench");
+    let bench = Bench::wired(elf(), strings(), scenario, mistakes).expect("a bench");
     let board = Attended::new(bench);
     let mut person = board.person(Stdin::new(std::io::empty(), std::io::sink(), true));
-    let mut progress = Progress::new(scenario);
+    let mut progress = Progress::new(Scenario::default());
     let mut port = port(board);
     let mut line = Line::new(&mut port);
     let (mut said, mut kept) = (Vec::new(), 0);
@@ -55,7 +55,7 @@ fn assert_passed(progress: &Progress) {
 
 #[test]
 fn a_sound_board_passes_every_check_over_a_slow_probe() {
-    assert_passed(&power_up_over(&[], OnUsb::new));
+    assert_passed(&power_up_over(&[], &Scenario::default(), OnUsb::new));
 }
 
 #[test]
@@ -63,7 +63,7 @@ fn a_sound_board_passes_every_check_and_its_parameters_are_found() {
     let progress = power_up(&[]);
     assert_passed(&progress);
     let done: Vec<&str> = progress.checks().map(|check| check.name.as_str()).collect();
-    let all: Vec<&str> = bringup::CHECKS.iter().map(|info| info.name).collect();
+    let all: Vec<&str> = guided().collect();
     assert_eq!(done, all);
     let (found, rig) = (&progress.proposed.rig, Scenario::default().rig);
     let near = |found: f64, known: f64, within: f64| {
@@ -72,6 +72,42 @@ fn a_sound_board_passes_every_check_and_its_parameters_are_found() {
     near(found.sense.angle_zero_code, rig.sense.angle_zero_code, 2.0);
     near(found.drive.no_load_speed_mm_s, rig.drive.no_load_speed_mm_s, 3.0);
     near(found.preload.slew_n_per_s, rig.preload.slew_n_per_s, 1.5);
+    near(found.plant.mu, rig.plant.mu, 0.1);
+}
+
+/// The names of the checks that a power-up makes itself.
+fn guided() -> impl Iterator<Item = &'static str> {
+    let gates = bringup::GATES.iter().filter(|gate| !gate.stage.is_by_logs());
+    gates.flat_map(|gate| gate.checks.iter().map(|check| check[0]))
+}
+
+#[test]
+fn what_the_gates_find_of_hidden_rigs_is_within_their_intervals() {
+    for seed in 1..=if long() { 20 } else { 2 } {
+        let wide = include_str!("../../tests/identify/hidden.toml");
+        let hidden = Scenario::parse("hidden", wide, &[format!("run.seed={seed}")]).expect("a rig");
+        let found = power_up_over(&[], &hidden, |board| board);
+        assert_passed(&found);
+        let (plant, nominal) = (hidden.plant(), &Scenario::default().rig.sense);
+        for (key, truth) in [
+            ("plant.mu", plant.mu),
+            (
+                "sense.preload_full_scale_n",
+                nominal.preload_full_scale_n / plant.sensors.preload_sensor_gain,
+            ),
+            (
+                "sense.tread_full_scale_mm",
+                nominal.tread_full_scale_mm / plant.sensors.compression_gain,
+            ),
+        ] {
+            let source = &found.proposed.sources[key];
+            let ends: Vec<f64> =
+                source.split([' ', ',']).filter_map(|word| word.parse().ok()).collect();
+            println!("seed {seed}: {key} {truth:.3} of {source}");
+            assert!((ends[0]..=ends[1]).contains(&truth), "{seed} {key}: {truth}, {source}");
+            assert!((ends[1] - ends[0]) < 0.6 * truth, "{key}: {source}");
+        }
+    }
 }
 
 /// Each mistake, the check that finds it, and what its advice says.
@@ -107,6 +143,10 @@ const FOUND: &[(Mistake, &str, &str)] = &[
     (Mistake::SensorsExchanged, "preload lead", "compression sensor are exchanged"),
     (Mistake::ArmInwards, "arm direction", "codes grow inwards"),
     (Mistake::PreloadGain, "preload scale", "preload sensor's scale is wrong by 1.5"),
+    (Mistake::PreloadStop, "weights agree", "not linear"),
+    (Mistake::PreloadScale, "weight scale", "sense.preload_full_scale_n = 18"),
+    (Mistake::NoStop, "pull holds", "not on its stop"),
+    (Mistake::CompressionScale, "gauge scale", "sense.tread_full_scale_mm = 5.5"),
 ];
 
 #[test]
@@ -208,7 +248,7 @@ fn the_verb_moves_nothing_unconfirmed_and_goes_on_where_it_was_broken_off() {
     assert_eq!((code, &printed["complete"]), (Some(0), &true.into()), "{said}");
     assert_eq!(said.matches("passed before").count(), 3, "{said}");
     let checks = printed["checks"].as_array().expect("checks");
-    assert_eq!(checks.len(), bringup::CHECKS.len());
+    assert_eq!(checks.len(), guided().count());
     for check in checks {
         for key in ["name", "ok", "measured", "expected", "advice"] {
             assert!(!check[key].is_null(), "{check}");
@@ -217,7 +257,7 @@ fn the_verb_moves_nothing_unconfirmed_and_goes_on_where_it_was_broken_off() {
     let page = std::fs::read_to_string(place.join("up/report.html")).expect("a page");
     assert!(page.contains("wired as it should be"));
     // What it proposes is on the page, and what `params` takes.
-    let restore = ["params", "restore", "up/proposed.toml", "--target", "board", "--json"];
+    let restore = ["params", "restore", "up/mine.toml", "--target", "board", "--json"];
     let restored = good(place, &restore);
     for key in printed["proposed"].as_object().expect("keys").keys() {
         assert_eq!(restored["parameters"][key].to_string(), printed["proposed"][key], "{key}");

@@ -138,7 +138,7 @@ fn commission(seed: u64, changes: &[Change]) -> [Vec<String>; 3] {
         return [Vec::new(), vec![format!("{failed:?}")], Vec::new()];
     }
     let mut mine = progress.proposed;
-    assert_eq!(mine.sources.len(), 3, "{:?}", mine.sources);
+    assert_eq!(mine.sources.len(), 6, "{:?}", mine.sources);
     // Three deployments.
     let mut at = board(&hidden, None);
     let usual = mine.rig.preload.cruise_n;

@@ -67,7 +67,7 @@ pub(super) fn drive(session: &mut Session<'_, '_>) -> Result<Vec<Check>, Bringup
     }
     let proposed = session.proposed.rig.drive.no_load_speed_mm_s;
     if (no_load - proposed).abs() <= within {
-        session.measured("drive.no_load_speed_mm_s", no_load, within);
+        session.measured("drive.no_load_speed_mm_s", no_load, within, "two duties");
     }
     checks.push(check(
         "drive speed",

@@ -32,6 +32,10 @@ pub enum Action {
     Unplug(Sensor),
     /// Plug it in again.
     Plug(Sensor),
+    /// Rest the carriage on its stop and lift the wheel off the wall.
+    LiftOff,
+    /// Take off the weight or the gauge.
+    TakeOff(Sensor),
     /// Hold the board's reset button for two seconds.
     HoldReset,
 }
@@ -46,6 +50,10 @@ impl fmt::Display for Action {
             Self::ReleaseStop => f.write_str("Release the emergency stop."),
             Self::Unplug(sensor) => write!(f, "Unplug the {sensor}."),
             Self::Plug(sensor) => write!(f, "Plug the {sensor} in again."),
+            Self::LiftOff => f.write_str(
+                "Carriage on its stop, pre-tightener slack: lift the wheel clear of the wall.",
+            ),
+            Self::TakeOff(sensor) => write!(f, "Take that off the {sensor} again."),
             Self::HoldReset => f.write_str("Hold the board's reset button for 2 s."),
         }
     }
@@ -111,6 +119,10 @@ pub trait Operator {
 
     /// Looks at the rig.
     fn look(&mut self, question: Question) -> Result<Seen, BringupError>;
+
+    /// Puts the first or second weight, N, or gauge, mm, at a sensor; returns what is written on
+    /// it.
+    fn put(&mut self, sensor: Sensor, is_second: bool) -> Result<f64, BringupError>;
 }
 
 /// A person at the terminal, or the lines of a script.
@@ -164,6 +176,20 @@ impl<R: BufRead, W: Write> Operator for Stdin<R, W> {
         let seen = question.answers().iter().find(|(letter, _)| Some(*letter) == first);
         Ok(seen.map_or(Seen::Unknown, |(_, seen)| *seen))
     }
+
+    fn put(&mut self, sensor: Sensor, is_second: bool) -> Result<f64, BringupError> {
+        let which = if is_second { "second, twice the first or more" } else { "first" };
+        let prompt = match sensor {
+            Sensor::Preload => "Hang a weight on the wheel, which pulls as the wall presses. Its N",
+            Sensor::Compression => "Put a gauge under the compression sensor. Its mm",
+        };
+        loop {
+            let answer = self.ask(&format!("{prompt} (the {which})?"))?.replace(',', ".");
+            if let Some(value) = answer.parse().ok().filter(|v: &f64| v.is_finite() && *v > 0.0) {
+                return Ok(value);
+            }
+        }
+    }
 }
 
 #[cfg(test)]
@@ -172,11 +198,12 @@ mod tests {
 
     #[test]
     fn a_script_answers_and_its_end_allows_nothing() {
-        let mut script = Stdin::new(&b"y\n\no\nn\nno\n"[..], Vec::new(), false);
+        let mut script = Stdin::new(&b"y\n\no\nn\n2 kg\n19,6\nno\n"[..], Vec::new(), false);
         assert!(script.confirm("The wheel turns.").is_ok());
         assert!(script.act(Action::PressStop).is_ok());
         assert_eq!(script.look(Question::Turned).unwrap(), Seen::Outwards);
         assert_eq!(script.look(Question::Supplied).unwrap(), Seen::Nothing);
+        assert_eq!(script.put(Sensor::Preload, false).unwrap(), 19.6);
         assert!(matches!(script.confirm("Again."), Err(BringupError::Declined(_))));
         assert!(matches!(script.confirm("Again."), Err(BringupError::Declined(_))));
         assert!(matches!(script.act(Action::ReleaseStop), Err(BringupError::NoAnswer(_))));

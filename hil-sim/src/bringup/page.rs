@@ -40,7 +40,7 @@ pub fn html(progress: &Progress) -> String {
         .collect();
     body += &format!(
         "<section>\n<h2>Parameters proposed</h2>\n<table>\n<tr><th>key</th><th>was</th>\
-         <th>measured</th></tr>\n{list}</table>\n<p>`rig params restore proposed.toml` writes \
+         <th>measured</th></tr>\n{list}</table>\n<p>`rig params restore mine.toml` writes \
          them.</p>\n</section>\n"
     );
     page_of("first power-up", grade, &headline, &body)

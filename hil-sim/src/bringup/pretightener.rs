@@ -9,17 +9,17 @@ use super::motion::{CHANGED, bridge, driven, fault};
 use super::{BringupError, Check, Session, check};
 
 /// Duty of the pre-tightener, and the steps of preload, ms.
-const PRESS: f64 = 0.25;
+pub(super) const PRESS: f64 = 0.25;
 const STEPS_MS: [u32; 3] = [550, 850, 550];
 /// Factor by which a tread of the stated name may be stiffer or softer.
 const TREAD: f64 = 1.5;
 /// Rest behind a step, ms; the tread's memory is a tenth of a second. Its second half is judged.
-const REST_MS: u32 = 500;
+pub(super) const REST_MS: u32 = 500;
 
 /// Means at rest.
 #[derive(Clone, Copy, Debug, Default)]
-struct Level {
-    preload: f64,
+pub(super) struct Level {
+    pub(super) preload: f64,
     compression: f64,
     /// Compression from the zero that the controller has taken.
     pressed: f64,
@@ -27,7 +27,7 @@ struct Level {
 }
 
 impl Level {
-    fn of(rows: &[Record], scale: &Scale) -> Self {
+    pub(super) fn of(rows: &[Record], scale: &Scale) -> Self {
         let last = || rows.iter().rev().take(REST_MS as usize / 2);
         let first = last().next().map_or(0.0, angle);
         Self {
@@ -38,7 +38,7 @@ impl Level {
         }
     }
 
-    fn since(self, before: Self) -> Self {
+    pub(super) fn since(self, before: Self) -> Self {
         Self {
             preload: self.preload - before.preload,
             compression: self.compression - before.compression,
@@ -207,7 +207,7 @@ fn judge(session: &mut Session<'_, '_>, levels: &[(f64, Level)]) -> Vec<Check> {
         // The outer steps differ by what does not repeat.
         let repeats = (last.preload - second.preload - first.preload).abs();
         let within = 0.1 + repeats / (PRESS * (t_2 - t_short));
-        session.measured("preload.slew_n_per_s", rounded, within);
+        session.measured("preload.slew_n_per_s", rounded, within, "three steps");
     }
     checks.push(check(
         "preload scale",
@@ -222,7 +222,7 @@ fn judge(session: &mut Session<'_, '_>, levels: &[(f64, Level)]) -> Vec<Check> {
 }
 
 /// Takes the preload back, and leaves the service mode; what is left, and the mode.
-fn release(
+pub(super) fn release(
     session: &mut Session<'_, '_>,
     base: Level,
     scale: &Scale,
@@ -231,16 +231,18 @@ fn release(
     if session.line.mode()? != Some(Mode::Service) && session.line.reset()? != Some(Mode::Idle) {
         return Ok((base, None));
     }
-    let mut left = Level::default();
+    let (mut left, mut is_slack) = (Level::default(), false);
     let mut spent = 0;
     // As long as it was raised, and some more: dead times add up.
     while spent < raised_ms + 1500 {
         let motion = session.line.moved(press(-PRESS), 400, REST_MS)?;
         left = Level::of(&motion.rows, scale).since(base);
         spent += 400;
-        if left.is_none() || motion.mode != Mode::Service {
+        // Once more: the sensor shows less than this of what presses.
+        if is_slack || motion.mode != Mode::Service {
             break;
         }
+        is_slack = left.is_none();
     }
     Ok((left, session.line.reset()?))
 }

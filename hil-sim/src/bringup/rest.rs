@@ -208,7 +208,7 @@ fn arm(session: &mut Session<'_, '_>, rows: &[Record]) -> Vec<Check> {
         session.proposed.rig.sense.angle_zero_code = zero;
         // Half a code, and a wall machined to 0.05 mm.
         let wall = 0.05 / rig.rig.arm_length_mm / std::f64::consts::TAU * TURN;
-        session.measured("sense.angle_zero_code", zero, 0.5 + wall);
+        session.measured("sense.angle_zero_code", zero, 0.5 + wall, "the stow end");
     }
     checks.push(check("angle zero", near, shown, &advice));
     checks

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::{Check, Stage};
+use super::{Check, GATES, Stage};
 use crate::files::{FileError, write_text};
 use crate::scenario::Scenario;
 
@@ -32,15 +32,21 @@ impl Progress {
         Self { proposed: expected.clone(), expected, stages: Vec::new() }
     }
 
-    /// The progress that a file has for this rig; none if it is not there, or of another rig.
+    /// The progress that a file has for this rig, as it was or with what was measured; none if it
+    /// is not there, or of another rig.
     pub fn read(path: &Path, expected: &Scenario) -> Option<Self> {
+        let kept = Self::open(path)?;
+        let is_this = kept.expected == *expected || kept.proposed.rig == expected.rig;
+        is_this.then(|| Self { expected: expected.clone(), ..kept })
+    }
+
+    /// The progress that a file has, of whichever rig.
+    pub(super) fn open(path: &Path) -> Option<Self> {
         let text = std::fs::read_to_string(path).ok()?;
         let kept: Kept = serde_json::from_str(&text).ok()?;
-        if kept.expected != expected.to_toml() {
-            return None;
-        }
-        let proposed = Scenario::parse("proposed", &kept.proposed, &[]).ok()?;
-        Some(Self { expected: expected.clone(), proposed, stages: kept.stages })
+        let scenario = |text: &str| Scenario::parse("kept", text, &[]).ok();
+        let (expected, proposed) = (scenario(&kept.expected)?, scenario(&kept.proposed)?);
+        Some(Self { expected, proposed, stages: kept.stages })
     }
 
     /// Keeps it in a file.
@@ -53,8 +59,14 @@ impl Progress {
 
     /// Takes the checks of a stage, in place of those of an earlier attempt.
     pub(super) fn add(&mut self, stage: Stage, checks: Vec<Check>) {
-        self.stages.retain(|(known, _)| *known != stage);
+        self.forget(stage);
         self.stages.push((stage, checks));
+        self.stages.sort_by_key(|(stage, _)| *stage as usize);
+    }
+
+    /// A stage has to be passed again.
+    pub(super) fn forget(&mut self, stage: Stage) {
+        self.stages.retain(|(known, _)| *known != stage);
     }
 
     /// Whether a stage has passed.
@@ -64,9 +76,9 @@ impl Progress {
         })
     }
 
-    /// Whether every stage has passed.
+    /// Whether every stage of the first power-up has passed.
     pub fn is_complete(&self) -> bool {
-        Stage::ALL.iter().all(|stage| self.is_done(*stage))
+        GATES.iter().all(|gate| gate.run.is_none() || self.is_done(gate.stage))
     }
 
     pub fn checks(&self) -> impl Iterator<Item = &Check> {

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use super::failure::{Failure, Outcome};
 use super::output;
+use crate::bringup::{Stage, gates};
 use crate::identify::accept::{Acceptance, accept, brief};
 use crate::identify::record::Record;
 use crate::progress;
@@ -24,6 +25,10 @@ pub(super) struct Args {
     /// repeated; a gap without a reading is judged by the virtual rig's tread.
     #[arg(long, value_name = "STEP=MM", value_parser = reading)]
     gap: Vec<(usize, f64)>,
+
+    /// Directory of the rig's first power-up, which records whether it is accepted.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
 
     /// Prints the result as one JSON object.
     #[arg(long)]
@@ -57,6 +62,11 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
         let _progress = progress::spinner("accept");
         accept(&records, &runs, &args.gap)?
     };
+    if let Some(folder) = &args.out {
+        let gate = gates::accepted(&result.reasons);
+        let recorded = gates::record(folder, Stage::Acceptance, gate, &records[0].scenario, None);
+        recorded.map_err(Failure::input)?;
+    }
     output::result(args.json, &result, || human(&result))?;
     Ok(Outcome::of(result.passed))
 }

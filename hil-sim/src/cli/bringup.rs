@@ -1,17 +1,19 @@
 //! `rig bringup`: the first power-up of a rig.
 
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use serde_json::{Map, Value, json};
 
 use super::failure::{Failure, Outcome};
 use super::output;
 use super::params::scenario_of;
-use crate::bringup::{self, Check, Line, Operator, Progress, Stdin};
+use crate::bringup::{self, Check, Line, Operator, Progress, Stage, Stdin, gates};
 use crate::files::{make_directory, write_text};
+use crate::identify::record::Record;
 use crate::probe::Port;
 use crate::provision::Extra;
+use crate::record::{log_at, recordings};
 use crate::scenario::Scenario;
 
 /// Checks the wiring of a rig at its first power-up, stage by stage.
@@ -31,7 +33,7 @@ pub struct Args {
     target: String,
 
     /// Directory of the files.
-    #[arg(long, value_name = "DIR", default_value = "out/bringup")]
+    #[arg(long, value_name = "DIR", default_value = gates::FOLDER)]
     pub out: PathBuf,
 
     /// Allows every motion unasked; what a hand has to do is still asked for.
@@ -41,6 +43,10 @@ pub struct Args {
     /// Begins again with the first stage.
     #[arg(long)]
     again: bool,
+
+    /// Records the first crossing, by the log of a deployment at 5 mm/s: log.mcap, or its folder.
+    #[arg(long, value_name = "LOG", conflicts_with_all = ["yes", "again", "mistake", "file"])]
+    log: Option<PathBuf>,
 
     /// A mistake in the emulated board's wiring, to be found; may be given several times.
     #[arg(long, value_name = "NAME")]
@@ -61,6 +67,9 @@ impl Args {
 
 /// Runs the verb.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
+    if let Some(log) = &args.log {
+        return crossed(args, &log_at(log));
+    }
     if args.target == "board" {
         return Err(Failure::Elsewhere(Extra::Board));
     }
@@ -73,6 +82,21 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
 /// The person at the terminal.
 pub fn person(yes: bool) -> Stdin<io::StdinLock<'static>, io::Stderr> {
     Stdin::new(io::stdin().lock(), io::stderr(), yes)
+}
+
+/// Records the first crossing in this log.
+fn crossed(args: &Args, log: &Path) -> Result<Outcome, Failure> {
+    let scenario = Record::read(log, None)?.scenario;
+    let run = recordings(log).map_err(Failure::input)?.pop().unwrap_or_default().summary;
+    let gate = gates::crossed(&run, &scenario);
+    let progress = gates::record(&args.out, Stage::Crossing, gate.clone(), &scenario, None);
+    let progress = progress.map_err(Failure::input)?;
+    write_text(&args.out.join("report.html"), &bringup::html(&progress))?;
+    let lacking = gates::lacking(&args.out).unwrap_or_default();
+    let printed = json!({ "complete": gate.ok, "checks": [gate], "lacking": lacking });
+    let text = || format!("{}: {}\n{}{lacking}\n", gate.name, gate.measured, gate.advice);
+    output::result(args.json, &printed, text)?;
+    Ok(Outcome::of(gate.ok))
 }
 
 /// Carries it out at this port.
@@ -98,7 +122,7 @@ pub fn carry_out(
         (Err(crate::params::StoreError::Silent { .. }), given) => given.unwrap_or_default(),
         (Err(error), _) => return Err(Failure::run(error)),
     };
-    let state = file("bringup.json");
+    let state = file(gates::STATE);
     let kept = Progress::read(&state, &expected).filter(|_| !args.again);
     let mut progress = kept.unwrap_or_else(|| Progress::new(expected));
     let mut unwritten = None;
@@ -112,7 +136,7 @@ pub fn carry_out(
     if let Some(error) = unwritten {
         return Err(error.into());
     }
-    let files = [state.clone(), file("report.html"), file("proposed.toml")];
+    let files = [state.clone(), file("report.html"), file(gates::MINE)];
     write_text(&files[1], &bringup::html(&progress))?;
     write_text(&files[2], &progress.proposed.to_toml())?;
     ended.map_err(Failure::run)?;

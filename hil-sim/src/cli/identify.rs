@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::failure::{Failure, Outcome};
 use super::output::{self, WithFiles};
+use crate::bringup::{Stage, gates};
 use crate::identify::IdentifyError;
 use crate::identify::plot;
 use crate::identify::published::{self, CONVERGED, Tread};
@@ -42,7 +43,8 @@ pub(super) struct Args {
     scenario: Option<PathBuf>,
 
     /// Directory of the parameter file and the pictures; by default out/identify, with a number
-    /// if that has another result.
+    /// if that has another result. In that of a rig's first power-up the result goes into its
+    /// mine.toml, and the gate is recorded.
     #[arg(long, value_name = "DIR", conflicts_with = "published")]
     out: Option<PathBuf>,
 
@@ -83,6 +85,11 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
         identify(&records, &scenario)?
     };
     let files = write(&found, &records, args.out.as_deref())?;
+    if let Some(folder) = args.out.as_deref().filter(|folder| folder.join(gates::STATE).exists()) {
+        let gate = gates::identified(&found.scenario, found.is_complete);
+        let (of, logged) = (Stage::Identification, &records[0].scenario);
+        gates::record(folder, of, gate, logged, Some(&found.scenario)).map_err(Failure::input)?;
+    }
     print(args, &found, &files)
 }
 

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::builder::PossibleValuesParser;
 
 use super::failure::Failure;
+use crate::bringup::gates;
 use crate::scenario::{ControllerKind, PRESETS, Scenario};
 
 /// Which rig.
@@ -102,6 +103,15 @@ pub(super) fn seed(text: &str) -> Result<u64, &'static str> {
 pub(super) type Unused = (&'static str, fn(&RunArgs) -> Option<String>);
 pub(super) const CONTROLLER: Unused = ("controller", |args| args.controller.clone());
 pub(super) const SEED: Unused = ("seed", |args| args.seed.map(|seed| seed.to_string()));
+
+/// Says which gates the rig of this scenario file has not passed: that of its folder, or the usual
+/// one.
+pub(super) fn remind_gates(what: &str, file: Option<&Path>) {
+    let beside = file.and_then(Path::parent).filter(|at| at.join(gates::STATE).exists());
+    if let Some(lacks) = gates::lacking(beside.unwrap_or(Path::new(gates::FOLDER))) {
+        eprintln!("{what}: {lacks}");
+    }
+}
 
 impl RunArgs {
     /// Refuses an option, and its key, where it has no effect.

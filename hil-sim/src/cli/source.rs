@@ -4,7 +4,7 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 
 use super::failure::{Failure, Outcome};
-use super::scenario::{RunArgs, remind};
+use super::scenario::{RunArgs, remind, remind_gates};
 use crate::provision::Extra;
 use crate::record::{Bytes, Probed, Source, Virtual};
 use crate::scenario::Scenario;
@@ -47,6 +47,7 @@ impl SourceArgs {
             _ => {
                 let port = super::probe::reconnecting()?;
                 remind("the rig at the probe", &scenario);
+                remind_gates("the rig at the probe", self.run.scenario.file());
                 act(&mut Probed::new(port), &scenario)
             }
         }

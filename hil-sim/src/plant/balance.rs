@@ -170,7 +170,9 @@ impl Balance {
         known: Option<(f64, f64)>,
     ) -> Result<Solved, BalanceError> {
         let radius = ring.parameters().radius_mm;
-        let (mut low, mut high) = (0.2 * radius, 1.1 * radius + motion.wall.rise_mm);
+        // A wheel may hang higher.
+        let highest = (1.1 * radius + motion.wall.rise_mm).max(motion.height_mm);
+        let (mut low, mut high) = (0.2 * radius, highest);
         let scale = (self.preload_n + self.arm_n).max(1.0);
         let tolerance = TOLERANCE * scale;
         let start = motion.height_mm.clamp(low, high);
@@ -188,7 +190,7 @@ impl Balance {
             } else if residual != 0.0 {
                 height = 0.5 * (low + high);
             } else {
-                (low, high) = (0.2 * radius, 1.1 * radius + motion.wall.rise_mm);
+                (low, high) = (0.2 * radius, highest);
             }
         }
         for _ in 0..80 {

@@ -103,6 +103,10 @@ pub struct VirtualRig {
     contact_mm: f64,
     /// Sliding bodily over the wall.
     sliding: bool,
+    /// Force of a weight that hangs on the wheel and pulls it off the wall, N.
+    hung_n: f64,
+    /// Thickness of a gauge under the compression sensor, mm.
+    gauge_mm: Option<f64>,
     /// Held by the stop or latch that carries the load until the drive first turns.
     latched: bool,
     /// Tread speed of the last steady rolling, mm/s.
@@ -185,6 +189,8 @@ impl VirtualRig {
             wind_up: WindUp::default(),
             contact_mm: 1.0,
             sliding: false,
+            hung_n: 0.0,
+            gauge_mm: None,
             latched: true,
             rolled_mm_s: 0.0,
             base_mm: local.base_mm,

@@ -24,6 +24,9 @@ impl VirtualRig {
 
     /// What the compression sensor looks at, mm.
     fn compression_mm(&self) -> f64 {
+        if let Some(thickness_mm) = self.gauge_mm {
+            return thickness_mm;
+        }
         let (p, truth) = (&self.parameters, &self.truth);
         let mut depth = truth.depth_mm;
         if p.compression_patch > 0.0 {

@@ -1,0 +1,186 @@
+//! The gates behind the first power-up, which logs prove: first crossing, identification,
+//! acceptance; and what a rig still lacks.
+
+use std::path::Path;
+
+use toml::Value;
+
+use super::{Check, GATES, Progress, Stage, check};
+use crate::files::write_text;
+use crate::record::Summary;
+use crate::scenario::Scenario;
+
+/// Files in the folder of a rig: how far it has come, and its parameters.
+pub const STATE: &str = "bringup.json";
+pub const MINE: &str = "mine.toml";
+/// The folder, where none is named.
+pub const FOLDER: &str = "out/bringup";
+
+/// Fastest first crossing, mm/s, and slip that no crossing has, mm.
+const SLOW_MM_S: f64 = 5.5;
+const SLIP_MM: f64 = 0.5;
+/// Part by which a parameter in a log may differ: it was stored with fewer digits.
+const SAME: f64 = 1e-5;
+
+/// Whether a log is that of a first crossing.
+pub fn crossed(run: &Summary, scenario: &Scenario) -> Check {
+    let (steps, lines) = (scenario.rig.rig.step_positions_mm.len(), &run.crossings);
+    let fastest = lines.iter().map(|line| line.speed_mm_s).fold(0.0, f64::max);
+    let slips = lines.iter().filter_map(|line| line.slip_measured_mm);
+    let slip = slips.map(f64::abs).fold(0.0, f64::max);
+    let arrives = run.completed && run.faults.is_empty() && lines.len() == steps;
+    let ok = arrives && fastest <= SLOW_MM_S && slip <= SLIP_MM;
+    let fault = run.faults.first().map_or(String::new(), |fault| format!("; {}", fault.text));
+    let of = lines.len();
+    let measured = format!("{of} of {steps} steps, {fastest:.1} mm/s, slip {slip:.2} mm{fault}");
+    check("first crossing", ok, measured, "deploy at drive.cruise_speed_mm_s = 5 over every step")
+}
+
+/// Whether complete logs have shown tread and friction.
+pub fn identified(scenario: &Scenario, is_complete: bool) -> Check {
+    let wanted = ["tread.k_inf_pa_per_m", "tread.stiffening", "tread.tau_s", "plant.mu"];
+    let by_logs = |key: &&str| scenario.sources.get(*key).is_some_and(|by| by.contains("95 %"));
+    let shown: Vec<&str> = wanted.into_iter().filter(by_logs).collect();
+    let ok = is_complete && shown.len() == wanted.len();
+    let advice = "give three complete logs, at 0.75, 1 and 1.2 times the cruise preload";
+    check("identified", ok, format!("shown: {}", shown.join(", ")), advice)
+}
+
+/// That a rig is what its parameters say, or the first reason why not.
+pub fn accepted(reasons: &[String]) -> Check {
+    let measured = reasons.first().map_or("as its parameters say", String::as_str).to_owned();
+    check("accepted", reasons.is_empty(), measured, "`rig accept` names every reason")
+}
+
+/// Records a gate in this folder, with the parameters that it has found. The log's controller had
+/// `logged`; none of it may contradict what the folder knows.
+///
+/// # Errors
+/// A sentence: the folder has no power-up, the log is another rig's, or it cannot be written.
+pub fn record(
+    folder: &Path,
+    stage: Stage,
+    found: Check,
+    logged: &Scenario,
+    merged: Option<&Scenario>,
+) -> Result<Progress, String> {
+    let path = folder.join(STATE);
+    let mut progress = Progress::open(&path)
+        .ok_or_else(|| format!("{}: no power-up of a rig: `rig bringup`", path.display()))?;
+    let (ours, its) = (progress.proposed.keys(), logged.keys());
+    // Identification replaces what it finds: it needs the sensors alone.
+    let counts = |key: &String| {
+        progress.proposed.sources.contains_key(key)
+            && (merged.is_none() || key.starts_with("sense."))
+    };
+    let mut pairs = ours.iter().zip(&its).filter(|(ours, _)| counts(&ours.key));
+    if let Some((ours, its)) = pairs.find(|(ours, its)| !same(&ours.value, &its.value)) {
+        let (key, folder) = (&ours.key, folder.display());
+        return Err(format!(
+            "the log had {key} = {}, the rig in {folder} has {}",
+            its.value, ours.value
+        ));
+    }
+    let ok = found.ok;
+    progress.add(stage, vec![found]);
+    if let Some(merged) = merged.filter(|_| ok) {
+        // Another rig is to be accepted again.
+        progress.forget(Stage::Acceptance);
+        progress.proposed = with(&progress.proposed, merged).map_err(|error| error.to_string())?;
+    }
+    progress.write(&path).map_err(|error| error.to_string())?;
+    let mine = progress.proposed.to_toml();
+    write_text(&folder.join(MINE), &mine).map_err(|error| error.to_string())?;
+    Ok(progress)
+}
+
+/// The rig with each value of which another has the source.
+fn with(rig: &Scenario, other: &Scenario) -> Result<Scenario, crate::scenario::ScenarioError> {
+    let values = other.keys().into_iter().filter(|of| other.sources.contains_key(&of.key));
+    let sets: Vec<String> = values.map(|of| format!("{}={}", of.key, of.value)).collect();
+    let mut merged = rig.clone().with(&sets)?;
+    merged.sources.extend(other.sources.clone());
+    Ok(merged)
+}
+
+fn same(ours: &Value, its: &Value) -> bool {
+    match (ours, its) {
+        (Value::Float(ours), Value::Float(its)) => (ours - its).abs() <= SAME * ours.abs(),
+        (Value::Array(ours), Value::Array(its)) => {
+            ours.len() == its.len() && ours.iter().zip(its).all(|(ours, its)| same(ours, its))
+        }
+        _ => ours == its,
+    }
+}
+
+/// What the rig of this folder lacks, in a sentence; none if it has passed every gate.
+pub fn lacking(folder: &Path) -> Option<String> {
+    let missing: Vec<&str> = match Progress::open(&folder.join(STATE)) {
+        None => return Some(format!("no first power-up in {}: `rig bringup`", folder.display())),
+        Some(progress) => {
+            let missing = GATES.iter().filter(|gate| !progress.is_done(gate.stage));
+            missing.map(|gate| gate.name).collect()
+        }
+    };
+    let names = missing.join(", ");
+    (!missing.is_empty()).then(|| format!("gates not passed: {names} ({})", folder.display()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::record::CrossingLine;
+
+    #[test]
+    fn gates_are_recorded_for_their_rig_alone_and_keys_merge_with_their_sources() {
+        let folder = tempfile::tempdir().unwrap();
+        let folder = folder.path();
+        let passed = || accepted(&[]);
+        let mut rig = Scenario::default();
+        assert!(record(folder, Stage::Crossing, passed(), &rig, None).is_err());
+        assert!(lacking(folder).unwrap().starts_with("no first power-up"));
+        let mut progress = Progress::new(rig.clone());
+        progress.proposed.rig.sense.preload_full_scale_n = 199.5;
+        let by = "198.5 to 200.5, first power-up, by two weights".to_owned();
+        progress.proposed.sources.insert("sense.preload_full_scale_n".to_owned(), by.clone());
+        progress.write(&folder.join(STATE)).unwrap();
+        let other = record(folder, Stage::Crossing, passed(), &rig, None).unwrap_err();
+        assert!(other.contains("preload_full_scale_n = 200"), "{other}");
+        rig.rig.sense.preload_full_scale_n = 199.5 * (1.0 + 1e-7);
+        for stage in [Stage::Acceptance, Stage::Crossing] {
+            record(folder, stage, passed(), &rig, None).unwrap();
+        }
+        assert!(
+            lacking(folder)
+                .unwrap()
+                .ends_with(&format!("friction, identification ({})", folder.display()))
+        );
+        rig.rig.plant.mu = 0.93;
+        rig.sources.insert("plant.mu".to_owned(), "0.9 to 0.96, 95 %, by a".to_owned());
+        let found = record(folder, Stage::Identification, passed(), &rig, Some(&rig)).unwrap();
+        assert!(!found.is_done(Stage::Acceptance) && found.is_done(Stage::Crossing));
+        let mine = std::fs::read_to_string(folder.join(MINE)).unwrap();
+        let mine = Scenario::parse(MINE, &mine, &[]).unwrap();
+        assert_eq!((mine.rig.plant.mu, &mine.sources["sense.preload_full_scale_n"]), (0.93, &by));
+        assert!(!identified(&mine, true).ok, "the tread is missing");
+    }
+
+    #[test]
+    fn a_first_crossing_is_slow_and_without_fault_or_slip() {
+        let rig = Scenario::default();
+        let line = CrossingLine { speed_mm_s: 5.1, ..CrossingLine::default() };
+        let good = Summary { completed: true, crossings: vec![line; 3], ..Summary::default() };
+        assert!(crossed(&good, &rig).ok);
+        let spoilt: [fn(&mut Summary); 4] = [
+            |run| run.completed = false,
+            |run| run.crossings.truncate(2),
+            |run| run.crossings[1].speed_mm_s = 8.0,
+            |run| run.crossings[2].slip_measured_mm = Some(-0.8),
+        ];
+        for spoil in spoilt {
+            let mut run = good.clone();
+            spoil(&mut run);
+            assert!(!crossed(&run, &rig).ok);
+        }
+    }
+}

@@ -1,0 +1,121 @@
+//! Friction by a pull: the wheel is pressed, the drive pulls the carriage against its stop at the
+//! stow end, and the tread slips over the wall. What the wheel then lacks of its free speed at the
+//! same duty is the force of friction, as a part of the drive's stall force.
+
+use std::ops::ControlFlow;
+
+use super::figures::{Scale, counted, mean};
+use super::line::{drive, press};
+use super::motion::{driven, fault};
+use super::pretightener::{Level, PRESS, REST_MS, release};
+use super::{BringupError, Check, Session, check};
+
+/// Duties inwards: of a free wheel both, of the pull the second.
+const SLOW: f64 = 0.15;
+const FAST: f64 = 0.30;
+/// Time of a motion, ms: 16 of the 20 mm that the service mode allows. Its second half is judged.
+const PULL_MS: u32 = 1000;
+/// Preload, N, at which the pressing ends, and most motions up to there.
+const PRESSED_N: f64 = 12.0;
+const MOTIONS: u32 = 3;
+/// Friction that any tread has: by a force for half of it, it moves less than this, mm.
+const LEAST: f64 = 0.4;
+const STANDS_MM: f64 = 0.05;
+/// Parts of the free speed between which it slips.
+const SLIPS: (f64, f64) = (0.1, 0.97);
+/// Frictions of rubber on metal, from wet to clean.
+const FRICTIONS: (f64, f64) = (0.3, 1.6);
+/// How well the stall force at this supply is known, and the preload.
+const KNOWN: f64 = 0.05 + 0.01;
+
+/// The pull, and the preload off again.
+pub(super) fn run(session: &mut Session<'_, '_>) -> Result<Vec<Check>, BringupError> {
+    let rig = session.proposed.rig.clone();
+    let (scale, stall) = (Scale::of(&rig), rig.drive.stall_force_n);
+    session.operator.confirm(
+        "Carriage on its stop at the stow end, preload off: the DRIVE turns the wheel inwards, 15 % \
+         and 30 % for 1 s.",
+    )?;
+    let base = Level::of(&session.line.listen(REST_MS)?, &scale);
+    // Speed of the tread inwards, mm/s; rows after it; and the fault that ended it.
+    let pull = |session: &mut Session<'_, '_>, duty: f64| -> Result<_, BringupError> {
+        let motion = session.line.moved(drive(-duty), PULL_MS, REST_MS)?;
+        let rows = driven(&motion, 0);
+        let steady = &rows[rows.len() / 2..];
+        let seconds = steady.len().saturating_sub(1).max(1) as f64 * 1e-3;
+        let speed = -counted(steady).sum as f64 * scale.count_mm / seconds;
+        let after = Level::of(&motion.rows, &scale).since(base).preload;
+        Ok((speed, after, fault(&motion)))
+    };
+    let (slow, free) = (pull(session, SLOW)?.0, pull(session, FAST)?.0);
+    let no_load = (free - slow) / (FAST - SLOW);
+    session.operator.confirm(&format!(
+        "Wheel on the wall: the PRE-TIGHTENER presses it to about {PRESSED_N} N, the DRIVE pulls \
+         inwards against the stop, 30 % for 1 s three times, until the tread slips."
+    ))?;
+    let (mut pressed_ms, mut preload) = (0, 0.0);
+    for _ in 0..MOTIONS {
+        let motion = session.line.move_and(press(PRESS), 2400, REST_MS, |line| {
+            let last = line.heard().iter().rev().take(20);
+            let is_pressed = mean(last.map(|row| scale.preload(row))).0 >= PRESSED_N;
+            Ok(if is_pressed { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
+        })?;
+        pressed_ms += driven(&motion, 1).len() as u32;
+        preload = Level::of(&motion.rows, &scale).since(base).preload;
+        if preload >= PRESSED_N {
+            break;
+        }
+    }
+    // The first pull takes up what room the stop has.
+    pull(session, FAST)?;
+    let arm = (rig.centre_radius_mm(0) - rig.rig.arm_pivot_radius_mm) / rig.rig.arm_length_mm;
+    let thrust = rig.plant.arm_coupling * arm / (1.0 - arm * arm).sqrt();
+    let least = 0.5 * LEAST * preload / (1.0 + thrust.max(0.0) * LEAST);
+    let (held, _, first_fault) = pull(session, FAST - free / no_load + least / stall)?;
+    let stood = 0.5e-3 * f64::from(PULL_MS) * held;
+    let (first, ..) = pull(session, FAST)?;
+    let (second, after, last_fault) = pull(session, FAST)?;
+    let faults = first_fault + &last_fault;
+    let (left, _) = release(session, base, &scale, pressed_ms)?;
+    let mut checks = vec![check(
+        "pull holds",
+        stood.abs() < STANDS_MM && preload >= 0.8 * PRESSED_N,
+        format!("{stood:.3} mm at {least:.1} N, {preload:.1} N of preload{faults}"),
+        "the wheel rolls: the carriage is not on its stop at the stow end, or the wheel is not on \
+         the wall",
+    )];
+    let part = 0.5 * (first + second) / free;
+    if checks[0].ok {
+        checks.push(check(
+            "pull slips",
+            (SLIPS.0..SLIPS.1).contains(&part) && faults.is_empty(),
+            format!("{:.0} % of its free speed{faults}", 100.0 * part),
+            "near its free speed the wheel does not touch the wall; near rest 30 % is too little, \
+             or something holds the drive",
+        ));
+    }
+    if checks.iter().any(|check| !check.ok) {
+        return Ok(checks);
+    }
+    let lacks = (1.0 - part) * free / no_load;
+    let preload_n = 0.5 * (preload + after);
+    // The stop takes the drive's force, and so the arm takes preload off the wheel.
+    let mu = lacks * stall / (preload_n - thrust * lacks * stall);
+    // A count at either end of what is judged, and what does not repeat.
+    let speed = (first - second).abs() + scale.count_mm / (0.5e-3 * f64::from(PULL_MS));
+    let unsure = KNOWN + speed / (no_load * lacks) + (preload - after).abs() / preload_n;
+    let within = mu * (1.0 + thrust * mu).abs() * unsure;
+    let sound = (FRICTIONS.0..FRICTIONS.1).contains(&mu) && left.preload < 2.0;
+    if sound {
+        session.proposed.rig.plant.mu = (mu * 100.0).round() / 100.0;
+        session.measured("plant.mu", mu, within, "a pull");
+    }
+    checks.push(check(
+        "friction",
+        sound,
+        format!("{mu:.2}, {within:.2} either way: {:.2} N at {preload_n:.2} N", lacks * stall),
+        "the tread is wet or worn, drive.stall_force_n or the arm is another than stated, or the \
+         preload did not come off",
+    ));
+    Ok(checks)
+}
