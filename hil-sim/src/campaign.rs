@@ -38,9 +38,6 @@ impl<C: Sync, L: Send, O, E: Send> Campaign<'_, C, L, O, E> {
     /// The lines of the cases at these places, on all processors, without those that had not
     /// begun or were given up when an end was wanted. The lines do not depend on the number of
     /// processors.
-    ///
-    /// # Errors
-    /// The first one of a case.
     pub fn lines(&self, places: &[usize], watch: Watch) -> Result<Vec<(usize, L)>, E> {
         let Self { cases, run, .. } = self;
         let line = |place: &usize| {
@@ -58,9 +55,6 @@ impl<C: Sync, L: Send, O, E: Send> Campaign<'_, C, L, O, E> {
     }
 
     /// The outcome of all cases.
-    ///
-    /// # Errors
-    /// The first one of a case.
     pub fn complete(self, done: &(dyn Fn() + Sync)) -> Result<O, E> {
         let places: Vec<usize> = (0..self.cases.len()).collect();
         let lines = self.lines(&places, Watch { done, stop: &|| false })?;

@@ -111,9 +111,6 @@ pub struct Comparison {
 /// the same friction check and aims at a gap that lies below the reference by a reserve. The
 /// reserve of each is tuned until its worst gap over all rigs is the reference; then the times are
 /// comparable.
-///
-/// # Errors
-/// [`RunError`] if the parameters do not make a rig.
 pub fn campaign(
     scenario: &Scenario,
     seeds: Vec<u64>,

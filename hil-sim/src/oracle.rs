@@ -78,9 +78,6 @@ pub struct OracleRun {
 /// The fastest run of the scenario's plant that keeps these bounds, the preload limit, and on
 /// the continuous wall the controller's slip margin. A run that cannot keep them does not
 /// complete, and its line says why.
-///
-/// # Errors
-/// [`RunError`] if the plant is refused or fails.
 pub fn search(scenario: &Scenario, bounds: &Bounds, effort: Effort) -> Result<OracleRun, RunError> {
     let (plant, _) = initial_rig(scenario)?;
     let rig = &scenario.rig;

@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 
 use super::campaign::CampaignArgs;
 use super::failure::{Failure, Outcome};
-use super::scenario::{CONTROLLER, RunArgs};
+use super::scenario::RunArgs;
 use crate::campaign::{Column, Frame, column};
 use crate::compare::{self, Comparison, Entry, STRATEGIES};
 use crate::oracle::Effort;
@@ -38,7 +38,7 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
-    args.run.without(CONTROLLER, "every strategy is compared")?;
+    args.run.without_controller("every strategy is compared")?;
     let scenario = args.run.resolve()?;
     let effort = (!args.no_oracle).then_some(Effort::FULL);
     let campaign = compare::campaign(&scenario, scenario.seeds(args.count)?, effort)?;

@@ -7,7 +7,7 @@ use serde_json::{Map, Value, json};
 use super::campaign::CampaignArgs;
 use super::failure::{Failure, Outcome};
 use super::output;
-use super::scenario::{CONTROLLER, RunArgs};
+use super::scenario::RunArgs;
 use crate::campaign::{Column, Frame, column};
 use crate::compare::STRATEGIES;
 use crate::envelope::{self, Cell, Envelope, Grid};
@@ -43,7 +43,7 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
-    args.run.without(CONTROLLER, "every strategy has its map")?;
+    args.run.without_controller("every strategy has its map")?;
     let scenario = args.run.resolve()?;
     output::no_file(&args.out)?;
     let campaign = envelope::campaign(&scenario, args.grid)?;

@@ -99,11 +99,6 @@ pub(super) fn seed(text: &str) -> Result<u64, &'static str> {
     seed.ok_or("expected a whole number, 0 or more, at most 9223372036854775807")
 }
 
-/// An option of a run that a verb may have no use for: its name, and the value that was given.
-pub(super) type Unused = (&'static str, fn(&RunArgs) -> Option<String>);
-pub(super) const CONTROLLER: Unused = ("controller", |args| args.controller.clone());
-pub(super) const SEED: Unused = ("seed", |args| args.seed.map(|seed| seed.to_string()));
-
 /// Says which gates the rig of this scenario file has not passed: that of its folder, or the usual
 /// one.
 pub(super) fn remind_gates(what: &str, file: Option<&Path>) {
@@ -114,11 +109,10 @@ pub(super) fn remind_gates(what: &str, file: Option<&Path>) {
 }
 
 impl RunArgs {
-    /// Refuses an option, and its key, where it has no effect.
-    pub(super) fn without(&self, (option, given): Unused, because: &str) -> Result<(), Failure> {
-        let key = format!("run.{option}=");
-        let set = self.scenario.set.iter().find(|set| set.starts_with(&key));
-        let found = given(self).map(|value| format!("--{option} {value}"));
+    /// Refuses `--controller`, and its key, where it has no effect.
+    pub(super) fn without_controller(&self, because: &str) -> Result<(), Failure> {
+        let set = self.scenario.set.iter().find(|set| set.starts_with("run.controller="));
+        let found = self.controller.as_ref().map(|value| format!("--controller {value}"));
         let found = found.or_else(|| set.map(|set| format!("--set {set}")));
         found.map_or(Ok(()), |found| {
             Err(Failure::input(format!("{found}: has no effect, as {because}")))

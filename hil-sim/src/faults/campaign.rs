@@ -179,9 +179,6 @@ pub type Rigs = Vec<(Scenario, Twin)>;
 
 impl FaultCampaign {
     /// Runs each rig without a fault.
-    ///
-    /// # Errors
-    /// Those of `twin`.
     pub fn rigs<E: Send>(
         &self,
         twin: impl Fn(&Scenario) -> Result<Twin, E> + Sync,
@@ -244,17 +241,11 @@ fn doing(mode: Mode) -> &'static str {
 }
 
 /// Runs a scenario in software without a fault.
-///
-/// # Errors
-/// [`RunError`] if it cannot be made.
 pub fn twin(scenario: &Scenario) -> Result<Twin, RunError> {
     Twin::run(Session::new(scenario, Options::default())?, scenario, 0.0)
 }
 
 /// Runs a scenario in software with its fault, beside its twin.
-///
-/// # Errors
-/// [`RunError`] if it cannot be made.
 pub fn watched(scenario: &Scenario, twin: &Twin) -> Result<Instant, RunError> {
     let mut session = Session::new(scenario, Options::default())?;
     let trial = Trial::run(&mut session, scenario, twin, AFTER_S, |_, _, _, over| over)?;

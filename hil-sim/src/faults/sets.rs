@@ -26,9 +26,6 @@ pub const PREFIX_BITS: u32 = 2 * 8 * WORD_BYTES as u32;
 const MORE_N: f64 = 1.0 / 64.0;
 
 /// A set as it is stored.
-///
-/// # Errors
-/// [`CompileError`] if the rig is not sound.
 pub fn set(name: &str, rig: &Rig) -> Result<Vec<u8>, CompileError> {
     let mut rig = rig.clone();
     if name != KEPT {
@@ -38,9 +35,6 @@ pub fn set(name: &str, rig: &Rig) -> Result<Vec<u8>, CompileError> {
 }
 
 /// Both slots in flash, with the active and the spare set.
-///
-/// # Errors
-/// [`CompileError`] if the rig is not sound.
 pub fn places(scenario: &Scenario) -> Result<Vec<u8>, CompileError> {
     let mut flash = Vec::with_capacity(2 * SLOT_BYTES);
     for (name, sequence) in [(KEPT, SEQUENCE), (SPARE, SEQUENCE - 1)] {

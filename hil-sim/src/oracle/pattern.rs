@@ -41,9 +41,6 @@ type Known = (f64, f64);
 /// Looks for the largest x in `range` at which `excess`, which rises with x, is not positive:
 /// by secants from `guess`, between the ends that are known. Calls `excess` at most `tries`
 /// times, and stops early within a thousandth below zero.
-///
-/// # Errors
-/// What `excess` returns.
 pub fn largest_below<E>(
     (low, high): (f64, f64),
     guess: f64,

@@ -115,18 +115,12 @@ impl Balance {
     /// Solves for the height, starting from the one in `motion`: Newton's method
     /// inside a bracket, which is halved when the step leaves it. A wheel that nothing
     /// presses stays there, or gives way to the wall as far as it has to.
-    ///
-    /// # Errors
-    /// [`BalanceError`] if the preload cannot be carried.
     pub fn solve(&self, ring: &mut Ring, motion: Motion) -> Result<Solved, BalanceError> {
         self.search(ring, motion, None)
     }
 
     /// Brings a ring to rest on this wall under a radial load, N, from this height above it,
     /// mm, its rubber relaxed.
-    ///
-    /// # Errors
-    /// [`BalanceError`] if no height carries the load.
     pub fn rest(
         ring: &mut Ring,
         wall: LocalWall,
@@ -142,9 +136,6 @@ impl Balance {
     /// The same where the height in `motion` is predicted so well that one step of Newton's
     /// method does: if less than a small part of the preload is left there, the contact is moved
     /// by its derivatives and not computed again. Its force errs by a part of 1e-7.
-    ///
-    /// # Errors
-    /// As [`Balance::solve`].
     pub fn solve_near(&self, ring: &mut Ring, motion: Motion) -> Result<Solved, BalanceError> {
         let contact = ring.trial(&motion);
         let lift = motion.height_mm - ring.parameters().radius_mm;

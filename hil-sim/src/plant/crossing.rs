@@ -62,9 +62,6 @@ pub struct CrossingResult {
 }
 
 /// Rolls the wheel over one step and measures.
-///
-/// # Errors
-/// [`BalanceError`] if no height of the centre balances the preload.
 pub fn cross(case: &CrossingCase) -> Result<CrossingResult, BalanceError> {
     let speed_mm_s = case.speed_mm_s.abs();
     cross_along(case, &|_| (speed_mm_s, case.preload_n))
@@ -72,9 +69,6 @@ pub fn cross(case: &CrossingCase) -> Result<CrossingResult, BalanceError> {
 
 /// The same with the speed, mm/s, and the preload, N, of each place of the axle, mm from the face
 /// outwards; of the case's speed the sign counts.
-///
-/// # Errors
-/// [`BalanceError`] if no height of the centre balances the preload.
 pub fn cross_along(
     case: &CrossingCase,
     course: &dyn Fn(f64) -> (f64, f64),

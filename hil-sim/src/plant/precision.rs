@@ -76,9 +76,6 @@ pub fn cases() -> Vec<(f64, f64, Axial)> {
 
 /// Errors of isolated crossings at these settings, against the usual one made
 /// [`FINER`] times as fine; `done` is called after every crossing of the reference.
-///
-/// # Errors
-/// [`BalanceError`] if a crossing cannot be made.
 pub fn work_precision(
     rig: &Rig,
     settings: &[Setting],

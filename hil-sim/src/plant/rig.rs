@@ -258,9 +258,6 @@ impl VirtualRig {
     }
 
     /// Advances by `dt_s` under `drives`.
-    ///
-    /// # Errors
-    /// [`PlantError`] when the state stops meaning anything.
     pub fn step(&mut self, drives: &Drives, dt_s: f64) -> Result<(), PlantError> {
         let [drive, preload] = drives.worked();
         let worked = &Drives { drive, preload, ..*drives };

@@ -2,7 +2,6 @@
 
 mod bench;
 mod constants;
-mod figures;
 mod modes;
 mod paper;
 
@@ -27,8 +26,6 @@ enum Verb {
     Paper(paper::Args),
     #[command(hide = true)]
     Constants(constants::Args),
-    #[command(hide = true)]
-    Figures(figures::Args),
 }
 
 impl Verb {
@@ -38,7 +35,6 @@ impl Verb {
             Self::Modes(args) => modes::run(args),
             Self::Paper(args) => paper::run(args),
             Self::Constants(args) => constants::run(args),
-            Self::Figures(args) => figures::run(args),
         }
     }
 }

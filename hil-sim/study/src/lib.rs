@@ -5,6 +5,5 @@ pub mod bench;
 pub mod cli;
 pub mod figure;
 pub mod figure_svg;
-pub mod model_figures;
 pub mod paper;
 pub mod reference;

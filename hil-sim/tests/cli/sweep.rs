@@ -41,44 +41,16 @@ fn a_grid_of_deployments_has_rows_table_and_picture() {
 }
 
 #[test]
-fn a_crossing_is_swept_as_it_is_computed_alone() {
-    let at = &folder();
-    let arguments = "sweep --crossing --method fixed --no-files --json --key speed_mm_s=5,8 \
-                     --key preload_n=33.3,50";
-    let found = object(&rig_in(at, &arguments.split_whitespace().collect::<Vec<_>>()));
-    let rows = found["rows"].as_array().unwrap();
-    assert_eq!(rows.len(), 4);
-    let alone = "crossing --method fixed --speed-mm-s 8 --preload-n 50 --json";
-    let alone = object(&rig_in(at, &alone.split(' ').collect::<Vec<_>>()));
-    for key in ["gap_mm", "corner_force_n", "embedding_mm"] {
-        assert_eq!(rows[3][key], alone[key], "{key}");
-    }
-    // Without keys: gap against speed at cruise preload and at the limit.
-    let usual = object(&rig_in(at, &["sweep", "--crossing", "--method", "fixed", "--json"]));
-    let rows = usual["rows"].as_array().unwrap();
-    assert_eq!(rows.len(), 30);
-    let of = |preload: f64| {
-        let rows = rows.iter().filter(move |row| number(row, "preload_n") == preload);
-        rows.map(|row| number(row, "gap_mm")).collect::<Vec<_>>()
-    };
-    let (cruise, limit) = (of(33.3), of(50.0));
-    assert!(cruise.is_sorted() && limit.is_sorted(), "a faster crossing opens a larger gap");
-    assert!(cruise.iter().zip(&limit).all(|(a, b)| a > b), "more preload holds a smaller one");
-}
-
-#[test]
 fn what_cannot_be_swept_is_refused_before_anything_runs() {
     for (key, names) in [
         ("tread.tau=0.1,0.2", &["did you mean tread.tau_s?"][..]),
         ("tread.tau_s=0.1..0.2", &["--key", "LOW..HIGH:COUNT"]),
         ("tread.tau_s=0.1,0", &["tread.tau_s = 0", "0.001 to 10"]),
-        ("speed_mm_s=5,6", &["speed_mm_s: takes --crossing"]),
         ("run.seed=0..9999:9999", &["run.seed"]),
     ] {
         refused(&["sweep", "--key", key], names);
     }
     refused(&["sweep"], &["--key"]);
-    refused(&["sweep", "--crossing", "--key", "speed_mm_s=0,5"], &["--key speed_mm_s 0"]);
     let twice = ["sweep", "--key", "plant.mu=1,2", "--key", "plant.mu=1,2"];
     refused(&twice, &["plant.mu: given twice"]);
 }

@@ -28,9 +28,6 @@ pub struct Twin {
 
 impl Twin {
     /// Runs it, and watches what comes within this time of its end, s.
-    ///
-    /// # Errors
-    /// Those of the rig.
     pub fn run<R>(mut rig: R, scenario: &Scenario, after_s: f64) -> Result<Self, R::Error>
     where
         R: RunningRig<Error: From<RigError>>,

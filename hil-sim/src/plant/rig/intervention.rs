@@ -7,9 +7,6 @@ impl VirtualRig {
     /// Advances by `dt_s` with the wheel turning at this tread speed, mm/s, under this
     /// radial preload, N, in place of motor and pre-tightener. It is the total preload:
     /// the spring's rate must be 0. Modes of the arm are at rest.
-    ///
-    /// # Errors
-    /// [`PlantError`] when the state stops meaning anything.
     pub fn follow(&mut self, tread_mm_s: f64, preload_n: f64, dt_s: f64) -> Result<(), PlantError> {
         self.preload.hold(preload_n);
         self.imposed_speed_mm_s = Some(tread_mm_s);
