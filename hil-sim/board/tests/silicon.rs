@@ -1,9 +1,11 @@
 //! What the chip and the sensor on its bus do by their manuals, and a firmware has to know.
 
+use hil_sim::record::Run;
 use hil_sim::scenario::injection::{Injection, Kind, Target};
 use interstage::restart::{Reset, Stopped};
 use interstage::supervise::Mode;
 use rig_board::bench::STEP;
+use rig_board::chip::InputErrors;
 use rig_board::core::{Access, Bus, Register};
 use rig_board::description::flash::{self, acr};
 use rig_board::description::{self, rcc};
@@ -188,22 +190,70 @@ fn a_damaged_flash_cuts_the_bridges_without_the_software() {
     assert_eq!(board.step().drives.drive, 0.0);
 }
 
+/// A step of a converter's 12 bits in codes of 16.
+const CODE_STEP: i32 = 16;
+
+/// The converter is off by ten steps (DS12288, ADC accuracy, has less in all), 0.5 A over 10 mOhm of
+/// shared ground by six, and an edge of the PWM shows with forty, 33 mV: 5 pF of 500. The last two
+/// are estimates.
+fn input_errors(sign: i32) -> InputErrors {
+    let [offset, common_mode, crosstalk] = [10, 6, 40].map(|steps| steps * CODE_STEP * sign);
+    InputErrors { offset, common_mode, crosstalk }
+}
+
 /// Codes of 16 bits are means of 12: they have their resolution from the noise at the pins alone.
 #[test]
 fn inputs_without_noise_give_codes_of_12_bits_and_no_fault() {
+    /// As for the log of a board without such errors.
+    const PRELOAD_N: f64 = 1.0;
     // A third of a step of 12 bits, and none.
-    for noise in [
-        ["noise.preload_sensor_n=0.02", "noise.compression_sensor_mm=0.0005"],
-        ["noise.preload_sensor_n=0", "noise.compression_sensor_mm=0"],
+    let third = ["noise.preload_sensor_n=0.02", "noise.compression_sensor_mm=0.0005"];
+    let none = ["noise.preload_sensor_n=0", "noise.compression_sensor_mm=0"];
+    for (noise, errors) in [
+        (third, InputErrors::default()),
+        (none, InputErrors::default()),
+        (third, input_errors(-1)),
+        (none, input_errors(1)),
     ] {
         let mut board = Board::off(&noise);
-        board.machine().chip_mut().defects.quiet_inputs = true;
-        board.until("mode: idle", 3000);
-        // At rest for longer than what counts as stuck.
-        board.run(1000);
-        board.send(b's');
-        board.until("mode: deployed", 20_000);
-        assert!(!board.said("] fault "), "{:#?}", board.log);
+        board.machine().chip_mut().defects.input_errors = Some(errors);
+        // Preload by the millisecond, which is the tick's number.
+        let mut truths = vec![0.0];
+        while !board.said("mode: deployed") && truths.len() < 20_000 {
+            // At rest for longer than what counts as stuck.
+            if truths.len() == 3000 {
+                board.send(b's');
+            }
+            board.step();
+            truths.push(board.bench.plant.truth().preload_n);
+        }
+        assert!(board.said("mode: deployed") && !board.said("] fault "), "{:#?}", board.log);
+        let line = board.log.iter().find(|line| line.contains("zero: preload ")).expect("zeroed");
+        let (_, zero) = line.split_once("zero: preload ").expect("its code");
+        let zero: f64 = zero.split(' ').next().and_then(|word| word.parse().ok()).expect("a code");
+        let off = zero - f64::from(3277 + errors.offset);
+        assert!(off.abs() < f64::from(CODE_STEP), "{line}: {errors:?}");
+        for row in Run::of_stream(&board.frames).rows {
+            let seen = row.telemetry().expect("a row of a controller");
+            let off = (seen.preload.to_num::<f64>() - truths[row.tick as usize]).abs();
+            let run = matches!(seen.mode, Mode::Run(..));
+            assert!(!run || off < PRELOAD_N, "{errors:?}: {off} N at {}", row.tick);
+        }
+    }
+}
+
+/// Its code is not constant, so that its own check cannot find it.
+#[test]
+fn a_dead_sensor_whose_code_the_pwm_moves_is_found_by_other_checks() {
+    for sensor in [0, 1] {
+        let mut board = Board::moving();
+        let defects = &mut board.machine().chip_mut().defects;
+        defects.input_errors = Some(input_errors(1));
+        defects.stuck_codes[sensor] = Some([12_000, 7000][sensor]);
+        board.until("] fault ", 8000);
+        assert!(!board.said("fault 116") && !board.said("fault 117"), "{:#?}", board.log);
+        board.run(50);
+        board.assert_off(100);
     }
 }
 
