@@ -273,7 +273,15 @@ impl<'a> Bench<'a> {
         self.frames.as_mut().map(std::mem::take).unwrap_or_default()
     }
 
-    /// Sets whether the binary log's channel is read; it is at first.
+    /// The same, or what its ring holds while it is not read.
+    pub(crate) fn read_log(&mut self) -> Result<Vec<u8>, BoardError> {
+        match &mut self.frames {
+            Some(frames) => Ok(std::mem::take(frames)),
+            None => Ok(self.probe.up(&mut self.machine, 1)?),
+        }
+    }
+
+    /// Sets whether the binary log's channel is read each millisecond; it is at first.
     pub fn listen(&mut self, listen: bool) {
         self.frames = listen.then(|| self.take_frames());
     }
