@@ -52,6 +52,8 @@ pub struct Defects {
     /// The noise at the analogue inputs is below half a step of 12 bits, and they have these
     /// errors.
     pub input_errors: Option<InputErrors>,
+    /// The core has its full clock, which the system timer counts, without a program that sets it up.
+    pub full_clock: bool,
     /// DMA moves nothing.
     pub dma_stalled: bool,
     /// Writes that clear the flags of the time driver's timer have no effect.
