@@ -255,6 +255,13 @@ impl<'a> Bench<'a> {
         chip.turn_wheel(self.wheel, STEP);
     }
 
+    /// A probe attaches, and halts the core for some 30 accesses of half a millisecond: to halt it,
+    /// read the reason and clear it, look for breakpoints, step and run. Source: probe-rs 0.32,
+    /// `Session::new`, `Session::halted_access`, `Armv7m`.
+    pub fn attach(&mut self) {
+        self.machine.halt(15 * STEP);
+    }
+
     /// Sends a letter to the board's console; false if it has no room or is not set up yet.
     pub fn send(&mut self, letter: u8) -> Result<bool, BoardError> {
         Ok(self.probe.down(&mut self.machine, 0, &[letter])? == 1)

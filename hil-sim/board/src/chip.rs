@@ -80,6 +80,14 @@ impl InputErrors {
     /// amplifier of some MHz.
     const RINGS: u64 = 51;
 
+    /// Large ones of this sign: ten steps of 12 bits (DS12288, ADC accuracy, has less in all), six
+    /// for 0.5 A over 10 mOhm of shared ground, and forty, 33 mV, for 5 pF of 500 at an edge. The
+    /// last two are estimates.
+    pub fn large(sign: i32) -> Self {
+        let [offset, common_mode, crosstalk] = [10, 6, 40].map(|steps| steps * 16 * sign);
+        Self { offset, common_mode, crosstalk }
+    }
+
     /// Their sum, by the bridges' levels and the cycles since their edges.
     fn sum(self, bridges: [(bool, u64); 2]) -> i32 {
         let of_one = |(high, since): (bool, u64)| {

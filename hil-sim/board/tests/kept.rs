@@ -226,12 +226,11 @@ fn a_reset_into_a_low_supply_leaves_its_place_unsure() {
 fn a_start_waits_for_its_supply() {
     let mut board = Board::idle();
     board.frames.clear();
-    // Power comes back with a low supply for a tenth of a second.
+    // Power comes back with a low supply for a tenth of a second, of which 22 ms at the slow clock.
     board.machine().restart(Cause::Power).expect("restarts");
     sags(&mut board, 100);
     let lines = board.log.len();
-    // The start at the slow clock takes 22 of them.
-    board.run(77);
+    board.run(99 - 22);
     assert_eq!(board.log.len(), lines, "{:#?}", &board.log[lines..]);
     board.until("mode: idle", 3000);
 }

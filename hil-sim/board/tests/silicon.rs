@@ -190,32 +190,16 @@ fn a_damaged_flash_cuts_the_bridges_without_the_software() {
     assert_eq!(board.step().drives.drive, 0.0);
 }
 
-/// A step of a converter's 12 bits in codes of 16.
-const CODE_STEP: i32 = 16;
-
-/// The converter is off by ten steps (DS12288, ADC accuracy, has less in all), 0.5 A over 10 mOhm of
-/// shared ground by six, and an edge of the PWM shows with forty, 33 mV: 5 pF of 500. The last two
-/// are estimates.
-fn input_errors(sign: i32) -> InputErrors {
-    let [offset, common_mode, crosstalk] = [10, 6, 40].map(|steps| steps * CODE_STEP * sign);
-    InputErrors { offset, common_mode, crosstalk }
-}
-
 /// Codes of 16 bits are means of 12: they have their resolution from the noise at the pins alone.
 #[test]
 fn inputs_without_noise_give_codes_of_12_bits_and_no_fault() {
-    /// As for the log of a board without such errors.
-    const PRELOAD_N: f64 = 1.0;
-    // A third of a step of 12 bits, and none.
-    let third = ["noise.preload_sensor_n=0.02", "noise.compression_sensor_mm=0.0005"];
-    let none = ["noise.preload_sensor_n=0", "noise.compression_sensor_mm=0"];
-    for (noise, errors) in [
-        (third, InputErrors::default()),
-        (none, InputErrors::default()),
-        (third, input_errors(-1)),
-        (none, input_errors(1)),
-    ] {
-        let mut board = Board::off(&noise);
+    // Noise of a third of a step of 12 bits, and none; errors of this sign, or none.
+    for (noise_n, sign) in [(0.02, 0), (0.0, 0), (0.02, -1), (0.0, 1)] {
+        let noise_mm = noise_n / 40.0;
+        let noise =
+            format!("noise.preload_sensor_n={noise_n} noise.compression_sensor_mm={noise_mm}");
+        let mut board = Board::off(&noise.split(' ').collect::<Vec<_>>());
+        let errors = InputErrors::large(sign);
         board.machine().chip_mut().defects.input_errors = Some(errors);
         // Preload by the millisecond, which is the tick's number.
         let mut truths = vec![0.0];
@@ -231,13 +215,11 @@ fn inputs_without_noise_give_codes_of_12_bits_and_no_fault() {
         let line = board.log.iter().find(|line| line.contains("zero: preload ")).expect("zeroed");
         let (_, zero) = line.split_once("zero: preload ").expect("its code");
         let zero: f64 = zero.split(' ').next().and_then(|word| word.parse().ok()).expect("a code");
-        let off = zero - f64::from(3277 + errors.offset);
-        assert!(off.abs() < f64::from(CODE_STEP), "{line}: {errors:?}");
+        assert!((zero - f64::from(3277 + errors.offset)).abs() < 16.0, "{line}: {errors:?}");
         for row in Run::of_stream(&board.frames).rows {
             let seen = row.telemetry().expect("a row of a controller");
             let off = (seen.preload.to_num::<f64>() - truths[row.tick as usize]).abs();
-            let run = matches!(seen.mode, Mode::Run(..));
-            assert!(!run || off < PRELOAD_N, "{errors:?}: {off} N at {}", row.tick);
+            assert!(off < 1.0 || !matches!(seen.mode, Mode::Run(..)), "{sign}: {off} N, {row:?}");
         }
     }
 }
@@ -248,7 +230,7 @@ fn a_dead_sensor_whose_code_the_pwm_moves_is_found_by_other_checks() {
     for sensor in [0, 1] {
         let mut board = Board::moving();
         let defects = &mut board.machine().chip_mut().defects;
-        defects.input_errors = Some(input_errors(1));
+        defects.input_errors = Some(InputErrors::large(1));
         defects.stuck_codes[sensor] = Some([12_000, 7000][sensor]);
         board.until("] fault ", 8000);
         assert!(!board.said("fault 116") && !board.said("fault 117"), "{:#?}", board.log);
@@ -257,8 +239,7 @@ fn a_dead_sensor_whose_code_the_pwm_moves_is_found_by_other_checks() {
     }
 }
 
-/// Most of it is the image's checksum at the internal oscillator's 16 MHz; the tick begins four
-/// milliseconds after it.
+/// Most of it is the image's checksum at 16 MHz; the tick begins four milliseconds after it.
 #[test]
 fn the_start_at_the_slow_clock_takes_a_fiftieth_of_a_second() {
     let mut board = Board::off(&[]);

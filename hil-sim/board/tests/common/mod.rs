@@ -19,7 +19,6 @@ use rig_board::elf::FLASH;
 use rig_board::faults::switch;
 use rig_board::log::Strings;
 use rig_board::machine::Machine;
-use rig_board::peripherals::HZ;
 use rig_board::peripherals::rcc::Cause;
 use rig_board::run::{self, Ran, RunOptions};
 
@@ -64,11 +63,6 @@ pub(crate) fn tried(cases: Vec<Case>, instants: usize) -> Outcome {
 pub(crate) const fn fault(target: Target, kind: Kind) -> Injection {
     Injection::at(target, kind, 0.0, 0.0)
 }
-
-/// Cycles for which a probe that attaches halts the core: some 30 accesses of half a millisecond, to
-/// halt it, read the reason and clear it, look for breakpoints, step and run. Source: probe-rs 0.32,
-/// `Session::new`, `Session::halted_access` and `Armv7m`.
-pub(crate) const ATTACHES: u64 = 30 * HZ / 2000;
 
 /// A port at a probe on USB, where accesses take time and what is sent goes in pieces.
 pub(crate) struct OnUsb<P> {
