@@ -329,7 +329,7 @@ def wiring():
         y += 310
     assert set(used) == set(pins), set(used) ^ set(pins)
     notes = ["Stop: both pins on one wire, 1 kΩ at the board, contact to ground; open = PWM off.",
-             "4.7 kΩ to ground at each PWM and enable line.",
+             "3.3 kΩ to ground at each PWM and enable line.",
              "100 kΩ and 10 nF to ground at PC2 and PC3.",
              "220 µF from 3V3 (CN7-16) to GND (CN7-20). Grounds joined at the bridges."]
     d.text(20, 812, *notes, size=21)

@@ -1,7 +1,7 @@
 //! Blocking writes of double words to the chip's second flash bank: for code that runs before
 //! the tasks or after them. The library's driver belongs to the task of the parameter sets, and
 //! these writes have no task to lend it; one of them comes from an interrupt, maybe in the middle
-//! of an operation of that driver.
+//! of an operation of that driver. `Flash::new_blocking` would serve the first start alone.
 //!
 //! The last pages of the 512 KiB are in use: one for image checksums, one for records of a lost
 //! supply, then the two slots of a parameter set.

@@ -29,6 +29,10 @@ const STEP_S: f64 = 1e-3;
 const MOST_COUNTS: i16 = 512;
 /// Core cycles in a millisecond.
 pub const STEP: u64 = HZ / 1000;
+/// Cycles from the plant's step to the firmware's tick: the converters have codes of after it.
+const BEFORE_TICK: u64 = STEP / 4;
+/// Cycles of a start at the slow clock, at most.
+const LONGEST_START: u64 = 30 * STEP;
 
 /// The board's inputs and outputs over a millisecond.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -51,9 +55,7 @@ pub struct Bench<'a> {
     wheel: i64,
     millisecond: u64,
     /// Cycle at which the current millisecond ends.
-    end: u64,
-    /// Restarts that `end` takes into account.
-    restarts: usize,
+    pub end: u64,
     /// Bytes from the binary log's channel; none while it is not read.
     frames: Option<Vec<u8>>,
     /// The faults of the scenario, if it has some.
@@ -97,7 +99,6 @@ impl<'a> Bench<'a> {
             wheel: 0,
             millisecond: 0,
             end: STEP,
-            restarts: 0,
             frames: Some(Vec::new()),
             injector: FaultInjector::of(scenario)
                 .map(|faults| BoardInjector::new(faults, scenario)),
@@ -116,7 +117,7 @@ impl<'a> Bench<'a> {
 
     /// Runs one millisecond. Returns inputs and outputs, and the lines of the log.
     pub fn step(&mut self) -> Result<(Passed, Vec<Line>), BoardError> {
-        let end = self.end();
+        let end = self.end;
         self.save()?;
         if let Some(injector) = &mut self.injector {
             // A fault at time zero is present before the first instruction.
@@ -133,7 +134,24 @@ impl<'a> Bench<'a> {
             }
         }
         self.machine.run_on(end)?;
+        self.start()?;
         self.close()
+    }
+
+    /// A start up to the chip's full clock is put before a millisecond: the firmware's begin with
+    /// that clock. A start that hangs is left after a while.
+    fn start(&mut self) -> Result<(), BoardError> {
+        let (begun, mut passed) = (self.machine.now(), 0);
+        while self.machine.chip().rcc.slow_hz.is_some() && passed < LONGEST_START {
+            self.machine.run_on(self.machine.now() + STEP / 1000)?;
+            if (self.machine.now() - begun) / STEP > passed / STEP {
+                let drives = self.drives();
+                self.plant.step(&self.wiring.drives(drives), STEP_S)?;
+            }
+            passed = self.machine.now() - begun;
+            self.end = self.machine.now() + STEP - BEFORE_TICK;
+        }
+        Ok(self.machine.run_on(self.end)?)
     }
 
     /// The host of a fault that interrupts a parameter save exchanges bytes with the board.
@@ -154,26 +172,10 @@ impl<'a> Bench<'a> {
         self.injector.as_ref().and_then(BoardInjector::saving)
     }
 
-    /// Cycle at which the current millisecond ends.
-    ///
-    /// The bench counts milliseconds from the board's last start, as the firmware does, so
-    /// that a tick never coincides with a step of the plant.
-    fn end(&mut self) -> u64 {
-        let restarts = self.machine.restarts();
-        if let Some((at, _)) = restarts.last()
-            && restarts.len() != self.restarts
-        {
-            self.restarts = restarts.len();
-            let since = self.machine.now().saturating_sub(*at);
-            self.end = at + (since / STEP + 1) * STEP;
-        }
-        self.end
-    }
-
     /// Closes a millisecond that is over: the plant makes its step.
     fn close(&mut self) -> Result<(Passed, Vec<Line>), BoardError> {
         self.millisecond += 1;
-        self.end = self.end() + STEP;
+        self.end += STEP;
         let drives = self.drives();
         let passed = Passed { codes: self.codes, drives };
         let taken = match &mut self.injector {
@@ -252,6 +254,13 @@ impl<'a> Bench<'a> {
         chip.turn_wheel(self.wheel, STEP);
     }
 
+    /// A probe attaches, and halts the core for some 30 accesses of half a millisecond: to halt it,
+    /// read the reason and clear it, look for breakpoints, step and run. Source: probe-rs 0.32,
+    /// `Session::new`, `Session::halted_access`, `Armv7m`.
+    pub fn attach(&mut self) {
+        self.machine.halt(15 * STEP);
+    }
+
     /// Sends a letter to the board's console; false if it has no room or is not set up yet.
     pub fn send(&mut self, letter: u8) -> Result<bool, BoardError> {
         Ok(self.probe.down(&mut self.machine, 0, &[letter])? == 1)
@@ -272,7 +281,15 @@ impl<'a> Bench<'a> {
         self.frames.as_mut().map(std::mem::take).unwrap_or_default()
     }
 
-    /// Sets whether the binary log's channel is read; it is at first.
+    /// The same, or what its ring holds while it is not read.
+    pub(crate) fn read_log(&mut self) -> Result<Vec<u8>, BoardError> {
+        match &mut self.frames {
+            Some(frames) => Ok(std::mem::take(frames)),
+            None => Ok(self.probe.up(&mut self.machine, 1)?),
+        }
+    }
+
+    /// Sets whether the binary log's channel is read each millisecond; it is at first.
     pub fn listen(&mut self, listen: bool) {
         self.frames = listen.then(|| self.take_frames());
     }
@@ -287,7 +304,7 @@ impl<'a> Bench<'a> {
         self.plant.truth().rotation_rad * self.plant.parameters().ring.radius_mm
     }
 
-    /// Time since power came up, s.
+    /// Time since power came up, s, but for starts at the slow clock.
     pub fn time_s(&self) -> f64 {
         self.millisecond as f64 * STEP_S
     }

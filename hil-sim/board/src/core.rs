@@ -149,6 +149,11 @@ pub trait Bus {
         None
     }
 
+    /// The core's clock, Hz, while it is slower than full.
+    fn slow_hz(&self) -> Option<u64> {
+        None
+    }
+
     /// The program has sent an event.
     fn event(&mut self) {}
 }

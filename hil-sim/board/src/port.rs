@@ -68,7 +68,7 @@ impl Port for EmulatedPort {
 impl Port for Bench<'_> {
     fn up(&mut self, channel: u32) -> Result<Vec<u8>, PortError> {
         match channel {
-            1 => Ok(self.take_frames()),
+            1 => self.read_log().map_err(gone),
             2 => self.line_take().map_err(gone),
             _ => Ok(Vec::new()),
         }

@@ -125,7 +125,7 @@ const FOUND: &[(Mistake, &str, &str)] = &[
     (Mistake::PreloadPullDown, "preload lead", "100 kOhm at PC2"),
     (Mistake::StopShorted, "stop pressed", "shorted to ground"),
     (Mistake::StopSupply, "stop cuts supply", "second contact does not cut"),
-    (Mistake::BridgePullDowns, "held in reset", "pull-down of 4.7 kOhm"),
+    (Mistake::BridgePullDowns, "held in reset", "pull-down of 3.3 kOhm"),
     (Mistake::ReadbackSwapped, "drive bridge", "inputs of the drive's readback are swapped"),
     (Mistake::ReadbacksExchanged, "drive bridge", "readbacks are exchanged"),
     (Mistake::SupplyOff, "drive bridge", "motor supply is off"),

@@ -2,12 +2,22 @@
 
 use std::time::Duration;
 
-use hil_sim::probe::Port;
+use clap::Parser;
+use hil_sim::cli::{capture, live};
+use hil_sim::probe::{Port, PortError, ReconnectingPort};
+use hil_sim::record::{Controller, Decoder, Item, Probed, Run, Source, SourceError};
+use hil_sim::replay::replay;
+use hil_sim::scenario::injection::{Injection, Kind, Target};
+use interstage::fault::Limit;
+use interstage::rig::Rig;
+use interstage::supervise::Mode;
+use interstage::tick::Event;
+use rig_board::bench::Bench;
 use rig_board::log::Reader;
 use rig_board::peripherals::rcc::Cause;
 use rig_board::port::EmulatedPort;
 
-use crate::common::{OnUsb, elf, strings};
+use crate::common::{OnUsb, elf, scenario, strings};
 
 fn port() -> EmulatedPort {
     EmulatedPort::new(elf()).expect("an image")
@@ -57,4 +67,67 @@ fn the_time_of_a_port_includes_that_of_its_accesses() {
     let true_s = (port.port.machine.now() - before) as f64 / 170e6;
     assert!(true_s > 0.37, "500 accesses, one of them long");
     assert!((passed.as_secs_f64() - true_s).abs() < 1e-3, "{passed:?} of {true_s} s");
+}
+
+#[derive(Parser)]
+enum Verb {
+    Capture(capture::Args),
+    Live(live::Args),
+}
+
+/// An operator who starts the drive when the log shows it idle, and ends when it has arrived.
+struct Operated<'a>(Probed<'a>, Decoder, Mode);
+
+impl Source for Operated<'_> {
+    fn read(&mut self) -> Result<Option<Vec<u8>>, SourceError> {
+        let Self(probed, decoder, mode) = self;
+        let (before, bytes) = (*mode, probed.read()?.unwrap_or_default());
+        decoder.read(&bytes, &mut |item| {
+            if let Item::Tick(record, _) = item {
+                *mode = record.telemetry.mode;
+            }
+        });
+        if *mode == Mode::Idle && before != Mode::Idle {
+            probed.send(b's')?;
+        }
+        Ok((!matches!(before, Mode::Complete(_))).then_some(bytes))
+    }
+
+    fn send(&mut self, letter: u8) -> Result<(), SourceError> {
+        self.0.send(letter)
+    }
+}
+
+/// The probe attaches to a board that idles, and the board is reset under way.
+#[test]
+fn capture_and_live_over_a_slow_probe_keep_both_starts_of_a_board_that_is_reset() {
+    for verb in ["capture --json --out", "live --headless --fast --listen 127.0.0.1:0 --record"] {
+        let mut scenario = scenario(&[]);
+        scenario.run.faults = vec![Injection::at(Target::ResetPin, Kind::Reset, 4.0, 0.0)];
+        let mut bench = Bench::new(elf(), strings(), &scenario).expect("a bench");
+        bench.listen(false);
+        (0..1000).for_each(|_| drop(bench.step().expect("runs")));
+        bench.attach();
+        let mut port = Some(Box::new(OnUsb::new(bench)) as Box<dyn Port>);
+        let attach = || port.take().ok_or(PortError::Gone("once".to_owned()));
+        let port = ReconnectingPort::open(attach, Duration::ZERO, Duration::ZERO).expect("a port");
+        let mut source = Operated(Probed::new(port), Decoder::new(), Mode::Boot);
+        let folder = tempfile::tempdir().expect("a directory");
+        let words = format!("rig {verb} {}", folder.path().display());
+        let ended = match Verb::parse_from(words.split(' ')) {
+            Verb::Capture(args) => capture::write(&args, &mut source, &scenario),
+            Verb::Live(args) => live::watch(&args, &mut source, &scenario),
+        };
+        ended.expect("a log");
+        let run = Run::read(&folder.path().join("log.mcap")).expect("a log");
+        let halted = Event::Limit(Limit::CoreHalted);
+        let halts = run.events.iter().filter(|entry| entry.event == halted).count();
+        assert_eq!((halts, run.counts.restarts), (1, 1), "{verb}: {:?}", run.marks);
+        let last = |boot| run.since_boot(boot).rows.last().and_then(Controller::telemetry);
+        let modes = [0, 1].map(|boot| last(boot).expect("rows").mode);
+        assert!(matches!(modes, [Mode::Run(..), Mode::Complete(_)]), "{verb}: {modes:?}");
+        // The ring holds less than what comes in the probe's longest pauses: that is marked.
+        assert!(run.counts.garbage_bytes == 0 && run.rows.len() > 4000, "{:?}", run.counts);
+        assert!(replay(&run, &Rig::prototype()).expect("a sound rig").difference.is_none());
+    }
 }

@@ -33,6 +33,7 @@ fn checked() -> Machine {
     let path = build_binary("interstage-images", "selftest", Profile::Release, &[]);
     let elf = std::fs::read(path.expect("the image builds")).expect("readable");
     let mut machine = Machine::new(&elf).expect("an image");
+    machine.chip_mut().defects.full_clock = true;
     let stop = machine.run_until(PATIENCE).expect("runs");
     assert!(stop.is_some() && machine.place().contains("main"), "ended in {}", machine.place());
     machine

@@ -80,7 +80,7 @@ const TASKS: [(&str, &str, u64); 8] = [
 fn into_poll(board: &mut Board, task: &'static str, cycles: u64) {
     let mut search = TaskSearch::new(board.machine(), task, cycles);
     for _ in 0..500 {
-        let until = (board.machine().now() / STEP + 1) * STEP;
+        let until = board.bench.end;
         let machine = board.machine();
         if search.run(machine, until).expect("runs") {
             // A hang in a critical section is for the watchdog alone.

@@ -1,9 +1,11 @@
 //! What the chip and the sensor on its bus do by their manuals, and a firmware has to know.
 
+use hil_sim::record::Run;
 use hil_sim::scenario::injection::{Injection, Kind, Target};
 use interstage::restart::{Reset, Stopped};
 use interstage::supervise::Mode;
 use rig_board::bench::STEP;
+use rig_board::chip::InputErrors;
 use rig_board::core::{Access, Bus, Register};
 use rig_board::description::flash::{self, acr};
 use rig_board::description::{self, rcc};
@@ -191,27 +193,57 @@ fn a_damaged_flash_cuts_the_bridges_without_the_software() {
 /// Codes of 16 bits are means of 12: they have their resolution from the noise at the pins alone.
 #[test]
 fn inputs_without_noise_give_codes_of_12_bits_and_no_fault() {
-    // A third of a step of 12 bits, and none.
-    for noise in [
-        ["noise.preload_sensor_n=0.02", "noise.compression_sensor_mm=0.0005"],
-        ["noise.preload_sensor_n=0", "noise.compression_sensor_mm=0"],
-    ] {
-        let mut board = Board::off(&noise);
-        board.machine().chip_mut().defects.quiet_inputs = true;
-        board.until("mode: idle", 3000);
-        // At rest for longer than what counts as stuck.
-        board.run(1000);
-        board.send(b's');
-        board.until("mode: deployed", 20_000);
-        assert!(!board.said("] fault "), "{:#?}", board.log);
+    // Noise of a third of a step of 12 bits, and none; errors of this sign, or none.
+    for (noise_n, sign) in [(0.02, 0), (0.0, 0), (0.02, -1), (0.0, 1)] {
+        let noise_mm = noise_n / 40.0;
+        let noise =
+            format!("noise.preload_sensor_n={noise_n} noise.compression_sensor_mm={noise_mm}");
+        let mut board = Board::off(&noise.split(' ').collect::<Vec<_>>());
+        let errors = InputErrors::large(sign);
+        board.machine().chip_mut().defects.input_errors = Some(errors);
+        // Preload by the millisecond, which is the tick's number.
+        let mut truths = vec![0.0];
+        while !board.said("mode: deployed") && truths.len() < 20_000 {
+            // At rest for longer than what counts as stuck.
+            if truths.len() == 3000 {
+                board.send(b's');
+            }
+            board.step();
+            truths.push(board.bench.plant.truth().preload_n);
+        }
+        assert!(board.said("mode: deployed") && !board.said("] fault "), "{:#?}", board.log);
+        let line = board.log.iter().find(|line| line.contains("zero: preload ")).expect("zeroed");
+        let (_, zero) = line.split_once("zero: preload ").expect("its code");
+        let zero: f64 = zero.split(' ').next().and_then(|word| word.parse().ok()).expect("a code");
+        assert!((zero - f64::from(3277 + errors.offset)).abs() < 16.0, "{line}: {errors:?}");
+        for row in Run::of_stream(&board.frames).rows {
+            let seen = row.telemetry().expect("a row of a controller");
+            let off = (seen.preload.to_num::<f64>() - truths[row.tick as usize]).abs();
+            assert!(off < 1.0 || !matches!(seen.mode, Mode::Run(..)), "{sign}: {off} N, {row:?}");
+        }
     }
 }
 
-/// Until the PLL is selected the core runs at 16 MHz; its cycles are counted as those of the full
-/// clock here, so that the first tick comes later on a board than in the emulation.
+/// Its code is not constant, so that its own check cannot find it.
+#[test]
+fn a_dead_sensor_whose_code_the_pwm_moves_is_found_by_other_checks() {
+    for sensor in [0, 1] {
+        let mut board = Board::moving();
+        let defects = &mut board.machine().chip_mut().defects;
+        defects.input_errors = Some(InputErrors::large(1));
+        defects.stuck_codes[sensor] = Some([12_000, 7000][sensor]);
+        board.until("] fault ", 8000);
+        assert!(!board.said("fault 116") && !board.said("fault 117"), "{:#?}", board.log);
+        board.run(50);
+        board.assert_off(100);
+    }
+}
+
+/// Most of it is the image's checksum at 16 MHz; the tick begins four milliseconds after it.
 #[test]
 fn the_start_at_the_slow_clock_takes_a_fiftieth_of_a_second() {
     let mut board = Board::off(&[]);
+    let tick = board.function("interstage::tick::Controller::step_into");
     let machine = board.machine();
     let clock_in_use = |machine: &mut Machine| {
         let now = machine.now();
@@ -220,8 +252,11 @@ fn the_start_at_the_slow_clock_takes_a_fiftieth_of_a_second() {
     while rcc::cfgr::SWS.of(clock_in_use(machine)) == 1 {
         machine.run_on(machine.now() + 1000).expect("runs");
     }
-    let slow_ms = machine.now() as f64 / 16e3;
-    assert!((15.0..30.0).contains(&slow_ms), "{slow_ms} ms");
+    let full = machine.now();
+    assert!(machine.run_to(tick, full + 10 * STEP).expect("runs"), "no tick");
+    let [slow_ms, first_ms] = [full, machine.now()].map(|at| at as f64 / STEP as f64);
+    assert!((20.0..24.0).contains(&slow_ms), "{slow_ms} ms");
+    assert!((3.0..6.0).contains(&(first_ms - slow_ms)), "{first_ms} ms");
 }
 
 /// The detector has no filter; what is over after some microseconds was no fall.

@@ -36,7 +36,7 @@ pub(super) fn run(session: &mut Session<'_, '_>) -> Result<Vec<Check>, BringupEr
         "held in reset",
         moved,
         ["nothing moved", "something moved"],
-        "a pull-down of 4.7 kOhm at a bridge's PWM or enable line is missing (PA8, PA10, PC6, PC9): \
+        "a pull-down of 3.3 kOhm at a bridge's PWM or enable line is missing (PA8, PA10, PC6, PC9): \
          the one whose motor moved",
     ));
     // What was found stays, whatever the probe finds of the board after its reset.

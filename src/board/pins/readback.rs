@@ -3,7 +3,7 @@
 //! Taking the results, once a tick, starts the next conversions, which end long before the next
 //! tick. Each has its own result register: neither DMA nor an interrupt is needed. The library's
 //! `InjectedAdc` reads the results without saying whether they are complete, and takes a trigger
-//! of the hardware.
+//! of the hardware; its oversampled ring would take a DMA channel more.
 
 use embassy_stm32::Peri;
 use embassy_stm32::adc::{Adc, AdcChannel, AdcConfig, SampleTime};

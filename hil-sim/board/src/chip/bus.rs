@@ -110,6 +110,10 @@ impl Bus for Chip {
         self.system.exceptions.urgent().map(|(_, priority)| priority)
     }
 
+    fn slow_hz(&self) -> Option<u64> {
+        self.rcc.slow_hz.filter(|_| !self.defects.full_clock)
+    }
+
     fn event(&mut self) {
         self.system.exceptions.event = true;
     }

@@ -78,8 +78,6 @@ impl Chip {
             let wired = self.role(pin) == Role::Analog;
             let voltage = if wired { self.inputs[input] } else { 0 };
             let voltage = self.defects.stuck_codes[input].unwrap_or(voltage);
-            // What all conversions of a mean read as the same is a step of theirs.
-            let voltage = if self.defects.quiet_inputs { voltage & !0xF } else { voltage };
             self.adcs[converter / 2].set_input(converter % 2, channel, voltage);
         }
     }

@@ -17,6 +17,7 @@ use crate::description::adc12_common::{self, ccr};
 use crate::rules::Rule;
 
 use converter::Converter;
+pub use converter::Errors;
 
 /// Offset of the second converter, and of the common registers.
 const STRIDE: u32 = 0x100;
@@ -55,6 +56,22 @@ impl Adc {
         match ccr::CKMODE.of(self.common) {
             0 => PRESCALERS.get(ccr::PRESC.of(self.common) as usize).copied().unwrap_or(256),
             mode => 1 << (mode - 1),
+        }
+    }
+
+    /// As [`Peripheral::advance`], with errors at the inputs.
+    pub fn advance_with(&mut self, now: u64, errors: Option<Errors<'_>>) {
+        let clock = self.clock();
+        for (converter, inputs) in self.converters.iter_mut().zip(&self.inputs) {
+            while converter.done <= now {
+                let channel = converter.channel(None) as usize;
+                converter.finish(inputs.get(channel).copied().unwrap_or(0), clock, errors);
+            }
+            while let Some((rank, done)) = converter.injected.filter(|(_, done)| *done <= now) {
+                let channel = converter.channel(Some(rank)) as usize;
+                let voltage = inputs.get(channel).copied().unwrap_or(0);
+                converter.finish_injected(rank, voltage, (done, clock), errors);
+            }
         }
     }
 }
@@ -100,18 +117,7 @@ impl Peripheral for Adc {
     }
 
     fn advance(&mut self, now: u64) {
-        let clock = self.clock();
-        for (converter, inputs) in self.converters.iter_mut().zip(&self.inputs) {
-            while converter.done <= now {
-                let channel = converter.channel(None) as usize;
-                converter.finish(inputs.get(channel).copied().unwrap_or(0), clock);
-            }
-            while let Some((rank, done)) = converter.injected.filter(|(_, done)| *done <= now) {
-                let channel = converter.channel(Some(rank)) as usize;
-                let voltage = inputs.get(channel).copied().unwrap_or(0);
-                converter.finish_injected(rank, done, voltage, clock);
-            }
-        }
+        self.advance_with(now, None);
     }
 }
 

@@ -115,6 +115,23 @@ impl Pwm {
         self.high + if !self.registers.has(ccer::CC1P) { active } else { passed - active }
     }
 
+    /// The level of channel 1 at `at` and the cycles since its edge, by the period of now: one that
+    /// was begun later is taken to have been there before.
+    pub fn level(&self, at: u64) -> (bool, u64) {
+        let on = [bdtr::MOE, ccer::CC1E, cr1::CEN].iter().all(|field| self.registers.has(*field));
+        if self.frozen || !on {
+            return (false, u64::MAX);
+        }
+        let period = (self.period * self.prescaler) as i64;
+        let counted = (at as i64 - self.origin as i64).rem_euclid(period) as u64;
+        let first = (self.compare * self.prescaler).min(period as u64);
+        let in_first = counted < first;
+        let high = in_first ^ (self.registers.field(ccmr1_output::OC1M) == 7);
+        let constant = first == 0 || first == period as u64;
+        let since = if in_first { counted } else { counted - first };
+        (high, if constant { u64::MAX } else { since })
+    }
+
     /// Books the output up to `now`, before something changes.
     fn book(&mut self, now: u64) {
         self.high = self.high(now);
@@ -306,6 +323,8 @@ mod tests {
         timer.advance(4 * PERIOD);
         assert_eq!(timer.high(5 * PERIOD + 100), 2125 + 100);
         assert_eq!(timer.high(5 * PERIOD + 8000), 2 * 2125);
+        let level = [0, 2124, 2125, 8499].map(|at| timer.level(3 * PERIOD + at));
+        assert_eq!(level, [(true, 0), (true, 2124), (false, 0), (false, 6374)]);
     }
 
     /// One pulse of 50 periods at a duty of three quarters in this PWM mode, begun at cycle 0.

@@ -1,8 +1,8 @@
 //! Reset and clock control: oscillators and PLL with the times that they take to start, clock and
 //! reset switches, and the cause of the last reset.
 //!
-//! The core runs at its full clock from the start; the clocks that the program sets up are
-//! checked, see [`Rcc::broken_rule`].
+//! The core runs at the clock that is in use; timers count the full one from the start. The clocks
+//! that the program sets up are checked, see [`Rcc::broken_rule`].
 //!
 //! Source: RM0440, 7.2 (clocks) and 7.4 (registers); times: DS12288, clock source
 //! characteristics.
@@ -66,6 +66,8 @@ pub struct Rcc {
     ready: [u64; SOURCES.len()],
     /// `SW` of the source in use.
     used: u32,
+    /// The core's clock, Hz, while it is slower than [`HZ`].
+    pub slow_hz: Option<u64>,
 }
 
 impl Rcc {
@@ -77,7 +79,8 @@ impl Rcc {
         registers.set(CR, cr::HSION.mask);
         registers.set(CFGR, cfgr::SW.at(1));
         registers.set(CSR, cause.flags() | earlier);
-        Self { registers, ready: [0, u64::MAX, u64::MAX, u64::MAX, u64::MAX, u64::MAX], used: 1 }
+        let ready = [0, u64::MAX, u64::MAX, u64::MAX, u64::MAX, u64::MAX];
+        Self { registers, ready, used: 1, slow_hz: Some(OSCILLATORS[0]) }
     }
 
     /// Flags of earlier resets that were not cleared.
@@ -95,6 +98,12 @@ impl Rcc {
         let selected = self.registers.field(cfgr::SW);
         let ready = SELECTED.iter().any(|(sw, at)| *sw == selected && self.ready[*at] <= now);
         self.used = if ready { selected } else { self.used };
+        self.slow_hz = self.hclk(self.in_use()).filter(|hz| *hz < HZ);
+    }
+
+    /// `CFGR` with the source in use.
+    fn in_use(&self) -> u32 {
+        self.registers.get(CFGR) & !cfgr::SW.mask | cfgr::SW.at(self.used)
     }
 
     /// Frequency of the core, Hz, for this content of `CFGR`; none if nothing is selected.
@@ -128,8 +137,7 @@ impl Rcc {
     ) -> Option<Rule> {
         self.settle(now);
         let old = self.registers.get(CFGR);
-        let used = old & !cfgr::SW.mask | cfgr::SW.at(self.used);
-        let (before, after) = (self.hclk(used)?, self.hclk(write.onto(old))?);
+        let (before, after) = (self.hclk(self.in_use())?, self.hclk(write.onto(old))?);
         let most = WAIT_STATES[usize::from(boosts)].get(wait_states as usize);
         if after > 150_000_000 && !boosts {
             Some(Rule::Boost)

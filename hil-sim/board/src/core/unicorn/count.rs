@@ -5,6 +5,7 @@ use std::collections::HashSet;
 use super::hooks::NEEDLESS;
 use super::{Counted, Meter, Stop};
 use crate::accelerator::{Accelerator, WORD};
+use crate::peripherals::HZ;
 use crate::thumb::{self, Kind};
 use crate::timing::{self, REFILL};
 
@@ -46,6 +47,8 @@ pub(super) struct Count {
     /// Where the program is if it does not branch.
     pub(super) next: u32,
     pub(super) meter: Meter,
+    /// The core's clock, Hz, while it is slower than full.
+    pub(super) slow_hz: Option<u64>,
     /// Cycles at which to stop.
     pub(super) limit: u64,
     /// Why a hook stopped the engine.
@@ -83,6 +86,7 @@ impl Count {
             block: 0,
             next: 0,
             meter: Meter::default(),
+            slow_hz: None,
             limit: u64::MAX,
             stop: None,
             flash: None,
@@ -147,8 +151,9 @@ impl Count {
         *self.deferred.get(address.wrapping_sub(self.base) as usize / 2)?
     }
 
+    /// Adds cycles of the core, in those of the full clock.
     pub(super) fn spend(&mut self, cycles: u64) {
-        self.meter.cycles += cycles;
+        self.meter.cycles += self.slow_hz.map_or(cycles, |hz| cycles * HZ / hz);
     }
 
     /// Counts a block that begins here.

@@ -22,6 +22,7 @@ impl<B: Bus + 'static> UnicornCore<B> {
         uc.add_block_hook(1, 0, |uc, address, size| {
             let Inside { count, bus, .. } = uc.get_data_mut();
             let now = count.meter.cycles;
+            count.slow_hz = bus.slow_hz();
             // What stops here is not executed and so not counted.
             let (at, spent) = (address as u32, now >= count.limit || now >= bus.deadline());
             let urgent = bus.urgent();

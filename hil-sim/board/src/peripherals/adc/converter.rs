@@ -24,6 +24,9 @@ const WHOLE: [u32; 22] = [
 /// Commands under way, of the control register.
 const CONVERTS: u32 = bits(&[cr::ADSTART, cr::JADSTART]);
 
+/// What is added to the voltage at an input at a cycle, parts of 2^16 of the reference.
+pub type Errors<'a> = &'a dyn Fn(u64) -> i32;
+
 #[derive(Clone, Debug)]
 pub(super) struct Converter {
     pub(super) registers: Registers,
@@ -129,12 +132,29 @@ impl Converter {
         (self.ratio(rank) * self.half_clocks(rank) * clock).div_ceil(2)
     }
 
-    /// The code of `sixteen`, the voltage at the pin in parts of 2^16 of the reference.
+    /// The code of `sixteen`, the voltage at the pin in parts of 2^16 of the reference, whose
+    /// conversions end at `done`.
     ///
     /// The noise at a real pin exceeds a step of 12 bits, so that the mean of many conversions
-    /// has a finer resolution; here the sum is exact to one part of 2^16.
-    pub(super) fn code(&self, rank: Option<usize>, sixteen: u16) -> u32 {
-        let sum = u64::from(sixteen) * self.ratio(rank) / 16;
+    /// has a finer resolution; here the sum is exact to one part of 2^16. With `errors` there is no
+    /// such noise: each conversion has 12 bits of the voltage and its error as sampling ends.
+    pub(super) fn code(
+        &self,
+        rank: Option<usize>,
+        sixteen: u16,
+        (done, clock): (u64, u64),
+        errors: Option<Errors<'_>>,
+    ) -> u32 {
+        let sum = match errors {
+            None => u64::from(sixteen) * self.ratio(rank) / 16,
+            Some(errors) => (0..self.ratio(rank))
+                .map(|later| {
+                    let half_clocks = later * self.half_clocks(rank) + 25;
+                    let error = errors(done.saturating_sub(half_clocks * clock / 2));
+                    (i64::from(sixteen) + i64::from(error)).clamp(0, 0xFFFF) as u64 / 16
+                })
+                .sum(),
+        };
         let shift = if self.is_oversampled(rank) { self.registers.field(cfgr2::OVSS) } else { 0 };
         (sum >> shift) as u32 & 0xFFFF
     }
@@ -213,8 +233,15 @@ impl Converter {
     }
 
     /// The injected conversion of this rank is done, with this at its channel.
-    pub(super) fn finish_injected(&mut self, rank: usize, done: u64, voltage: u16, clock: u64) {
-        self.registers.set(JDR1 + 4 * rank as u32, self.code(Some(rank), voltage));
+    pub(super) fn finish_injected(
+        &mut self,
+        rank: usize,
+        voltage: u16,
+        (done, clock): (u64, u64),
+        errors: Option<Errors<'_>>,
+    ) {
+        let code = self.code(Some(rank), voltage, (done, clock), errors);
+        self.registers.set(JDR1 + 4 * rank as u32, code);
         self.registers.put(isr::JEOC, 1);
         if rank < self.registers.field(jsqr::JL) as usize {
             self.injected = Some((rank + 1, done + self.cycles(Some(rank + 1), clock)));
@@ -226,7 +253,7 @@ impl Converter {
     }
 
     /// The current calibration or conversion is done, with this voltage at its channel.
-    pub(super) fn finish(&mut self, voltage: u16, clock: u64) {
+    pub(super) fn finish(&mut self, voltage: u16, clock: u64, errors: Option<Errors<'_>>) {
         let done = std::mem::replace(&mut self.done, u64::MAX);
         if self.registers.has(cr::ADCAL) {
             self.registers.put(cr::ADCAL, 0);
@@ -246,7 +273,7 @@ impl Converter {
                 return;
             }
         }
-        self.registers.set(DR, self.code(None, voltage));
+        self.registers.set(DR, self.code(None, voltage, (done, clock), errors));
         self.registers.put(isr::EOC, 1);
         self.registers.put(isr::EOS, 1);
     }

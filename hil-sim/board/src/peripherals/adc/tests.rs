@@ -56,6 +56,19 @@ fn a_code_is_the_mean_of_its_conversions_and_takes_their_time() {
 }
 
 #[test]
+fn without_noise_each_conversion_has_twelve_bits_of_the_voltage_as_its_sampling_ends() {
+    // 2 of 16 are lost, and 14 more make a step: in none, one or two of 256.
+    for (until, steps) in [(49, 0), (50, 1), (150, 2)] {
+        let mut adc = ready();
+        adc.set_input(1, 9, 51_234);
+        write(&mut adc, 0x100 + CFGR2, 0x1D, BEGIN);
+        write(&mut adc, 0x100 + CR, REGULATOR | cr::ADSTART.mask, BEGIN);
+        adc.advance_with(adc.deadline(), Some(&|at| if at <= BEGIN + until { 14 } else { 0 }));
+        assert_eq!(adc.read(0x100 + DR, 0), Some((51_232 * 16 + steps) & 0xFFFF), "{until}");
+    }
+}
+
+#[test]
 fn a_code_that_is_not_read_is_kept_and_the_next_is_lost() {
     let mut adc = ready();
     for code in [1600, 3200] {
