@@ -109,9 +109,8 @@ gates! {
     Pretightener "pre-tightener", Some(pretightener::pretightener) =>
         "pre-tightener bridge" | "25 % for 0.55 s, readback" | "25 %, the other bridge 0"
         "preload rises" | "the same" | "preload and compression rise"
-        "preload against tread" | "three steps" | "compression grows less than the preload"
-        "arm direction" | "the same" | "the angle's code grows"
-        "preload scale" | "the same" | "as spring 25 %, as tread 50 %"
+        "arm direction" | "three steps" | "the angle's code grows"
+        "preload rate" | "the same" | "half to twice its parameter"
         "preload released" | "backwards until slack" | "below 2 N, then idle";
     /// Weights on the preload sensor.
     Weights "weights", Some(|session| reference::run(session, &reference::WEIGHT)) =>
@@ -124,8 +123,7 @@ gates! {
         "gauges agree" | "the same, and out" | "within 2 %, zero as before"
         "gauge scale" | "the same" | "its parameter, within 5 %";
     Friction "friction", Some(pull::run) =>
-        "pull holds" | "pressed at the stop, a small duty" | "the tread stands"
-        "pull slips" | "30 % against the stop" | "10 to 97 % of its free speed"
+        "pull slips" | "pressed, 30 % against the stop" | "10 to 97 % of its free speed"
         "friction" | "the same" | "0.3 to 1.6";
     /// A deployment at the least speed, by its log.
     Crossing "first crossing", None =>
@@ -137,18 +135,16 @@ gates! {
 }
 
 impl Stage {
-    fn gate(self) -> &'static Gate {
-        &GATES[self as usize]
-    }
-
     /// In words.
     pub fn name(self) -> &'static str {
-        self.gate().name
+        GATES[self as usize].name
     }
+}
 
+impl Gate {
     /// Whether logs prove it, and not the first power-up itself.
-    pub fn is_by_logs(self) -> bool {
-        self.gate().run.is_none()
+    pub fn is_by_logs(&self) -> bool {
+        self.run.is_none()
     }
 }
 

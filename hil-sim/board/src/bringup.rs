@@ -89,8 +89,7 @@ impl<O: Operator> Operator for Person<'_, O> {
             Action::ReleaseStop => wiring.stop_pressed = false,
             Action::Unplug(sensor) => wiring.unplugged.push(sensor),
             Action::Plug(sensor) => wiring.unplugged.retain(|known| *known != sensor),
-            Action::LiftOff | Action::TakeOff(Sensor::Preload) => bench.plant.hang(0.0),
-            Action::TakeOff(Sensor::Compression) => bench.plant.gauge(None),
+            Action::LiftOff | Action::TakeOff(_) => bench.plant.lift(0.0, None),
             Action::HoldReset => bench.hold_reset(RESET_MS).map_err(gone)?,
         }
         bench.connect();
@@ -119,10 +118,10 @@ impl<O: Operator> Operator for Person<'_, O> {
     fn put(&mut self, sensor: Sensor, is_second: bool) -> Result<f64, BringupError> {
         let (plant, which) = (&mut self.bench.borrow_mut().plant, usize::from(is_second));
         if sensor == Sensor::Preload {
-            plant.hang(WEIGHTS[which].1);
+            plant.lift(WEIGHTS[which].1, None);
             return Ok(WEIGHTS[which].0);
         }
-        plant.gauge(Some(GAUGES[which].1));
+        plant.lift(0.0, Some(GAUGES[which].1));
         Ok(GAUGES[which].0)
     }
 }

@@ -101,6 +101,9 @@ fn image(scenario: &Scenario) -> Result<(Vec<u8>, Strings), Failure> {
 
 /// The first power-up of the emulated board, with the mistakes in its wiring that are asked for.
 fn bring_up(args: &bringup::Args) -> Result<Outcome, Failure> {
+    if args.log.is_some() {
+        return bringup::run(args);
+    }
     let mistake = |name: &String| {
         Mistake::from_str(name, false).map_err(|_| {
             let all = Mistake::value_variants().iter().filter_map(Mistake::to_possible_value);

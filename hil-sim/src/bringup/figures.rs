@@ -91,14 +91,6 @@ pub(super) fn counted(rows: &[Record]) -> Counted {
     Counted { sum, range: high - low, changes }
 }
 
-/// Radial force that the relaxed tread carries at a compression, N: a cylinder on a bed of
-/// independent elements, p = k delta, so that P = 4/3 k L sqrt(2 R) delta^(3/2).
-pub(super) fn preload_n(rig: &Rig, compression_mm: f64) -> f64 {
-    let (radius, width) = (rig.rig.wheel_radius_mm * 1e-3, rig.rig.wheel_width_mm * 1e-3);
-    let per = 4.0 / 3.0 * rig.tread.k_inf_pa_per_m * width * (2.0 * radius).sqrt();
-    per * (compression_mm.max(0.0) * 1e-3).powf(1.5)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -113,23 +105,6 @@ mod tests {
                 "{from} {to}: {}",
                 turned(from, to)
             );
-        }
-    }
-
-    #[test]
-    fn the_bed_of_elements_carries_what_the_ring_carries() {
-        let rig = Rig::prototype();
-        let ring = crate::scenario::Scenario::default().plant().ring;
-        let at = |preload: f64| {
-            let rest =
-                crate::plant::rolling::solve(&ring, 0.0, rig.rig.wheel_radius_mm - 0.1, |c| {
-                    c.cosine_n - preload
-                });
-            rig.rig.wheel_radius_mm - rest.height_mm
-        };
-        for preload in [3.0, 10.0, 30.0] {
-            let bed = preload_n(&rig, at(preload));
-            assert!((bed / preload - 1.0).abs() < 0.03, "{preload} N: {bed}");
         }
     }
 

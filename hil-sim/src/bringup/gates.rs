@@ -1,9 +1,8 @@
 //! The gates behind the first power-up, which logs prove: first crossing, identification,
 //! acceptance; and what a rig still lacks.
 
+use std::error::Error;
 use std::path::Path;
-
-use toml::Value;
 
 use super::{Check, GATES, Progress, Stage, check};
 use crate::files::write_text;
@@ -19,8 +18,6 @@ pub const FOLDER: &str = "out/bringup";
 /// Fastest first crossing, mm/s, and slip that no crossing has, mm.
 const SLOW_MM_S: f64 = 5.5;
 const SLIP_MM: f64 = 0.5;
-/// Part by which a parameter in a log may differ: it was stored with fewer digits.
-const SAME: f64 = 1e-5;
 
 /// Whether a log is that of a first crossing.
 pub fn crossed(run: &Summary, scenario: &Scenario) -> Check {
@@ -63,7 +60,7 @@ pub fn record(
     found: Check,
     logged: &Scenario,
     merged: Option<&Scenario>,
-) -> Result<Progress, String> {
+) -> Result<Progress, Box<dyn Error>> {
     let path = folder.join(STATE);
     let mut progress = Progress::open(&path)
         .ok_or_else(|| format!("{}: no power-up of a rig: `rig bringup`", path.display()))?;
@@ -74,23 +71,23 @@ pub fn record(
             && (merged.is_none() || key.starts_with("sense."))
     };
     let mut pairs = ours.iter().zip(&its).filter(|(ours, _)| counts(&ours.key));
-    if let Some((ours, its)) = pairs.find(|(ours, its)| !same(&ours.value, &its.value)) {
+    if let Some((ours, its)) = pairs.find(|(ours, its)| ours.value != its.value) {
         let (key, folder) = (&ours.key, folder.display());
         return Err(format!(
             "the log had {key} = {}, the rig in {folder} has {}",
             its.value, ours.value
-        ));
+        )
+        .into());
     }
     let ok = found.ok;
     progress.add(stage, vec![found]);
     if let Some(merged) = merged.filter(|_| ok) {
         // Another rig is to be accepted again.
         progress.forget(Stage::Acceptance);
-        progress.proposed = with(&progress.proposed, merged).map_err(|error| error.to_string())?;
+        progress.proposed = with(&progress.proposed, merged)?;
     }
-    progress.write(&path).map_err(|error| error.to_string())?;
-    let mine = progress.proposed.to_toml();
-    write_text(&folder.join(MINE), &mine).map_err(|error| error.to_string())?;
+    progress.write(&path)?;
+    write_text(&folder.join(MINE), &progress.proposed.to_toml())?;
     Ok(progress)
 }
 
@@ -103,27 +100,17 @@ fn with(rig: &Scenario, other: &Scenario) -> Result<Scenario, crate::scenario::S
     Ok(merged)
 }
 
-fn same(ours: &Value, its: &Value) -> bool {
-    match (ours, its) {
-        (Value::Float(ours), Value::Float(its)) => (ours - its).abs() <= SAME * ours.abs(),
-        (Value::Array(ours), Value::Array(its)) => {
-            ours.len() == its.len() && ours.iter().zip(its).all(|(ours, its)| same(ours, its))
-        }
-        _ => ours == its,
-    }
-}
-
-/// What the rig of this folder lacks, in a sentence; none if it has passed every gate.
-pub fn lacking(folder: &Path) -> Option<String> {
-    let missing: Vec<&str> = match Progress::open(&folder.join(STATE)) {
-        None => return Some(format!("no first power-up in {}: `rig bringup`", folder.display())),
-        Some(progress) => {
-            let missing = GATES.iter().filter(|gate| !progress.is_done(gate.stage));
-            missing.map(|gate| gate.name).collect()
-        }
+/// What the rig of this scenario file lacks, in a sentence: that of its folder, or of the usual one.
+/// None if it has passed every gate.
+pub fn lacking(file: Option<&Path>) -> Option<String> {
+    let beside = file.and_then(Path::parent).filter(|at| at.join(STATE).exists());
+    let folder = beside.unwrap_or(Path::new(FOLDER));
+    let Some(progress) = Progress::open(&folder.join(STATE)) else {
+        return Some(format!("no first power-up in {}: `rig bringup`", folder.display()));
     };
-    let names = missing.join(", ");
-    (!missing.is_empty()).then(|| format!("gates not passed: {names} ({})", folder.display()))
+    let missing = GATES.iter().filter(|gate| !progress.is_done(gate.stage));
+    let names = missing.map(|gate| gate.name).collect::<Vec<_>>().join(", ");
+    (!names.is_empty()).then(|| format!("gates not passed: {names} ({})", folder.display()))
 }
 
 #[cfg(test)]
@@ -138,20 +125,20 @@ mod tests {
         let passed = || accepted(&[]);
         let mut rig = Scenario::default();
         assert!(record(folder, Stage::Crossing, passed(), &rig, None).is_err());
-        assert!(lacking(folder).unwrap().starts_with("no first power-up"));
+        assert!(lacking(None).unwrap().starts_with("no first power-up in out/bringup"));
         let mut progress = Progress::new(rig.clone());
         progress.proposed.rig.sense.preload_full_scale_n = 199.5;
         let by = "198.5 to 200.5, first power-up, by two weights".to_owned();
         progress.proposed.sources.insert("sense.preload_full_scale_n".to_owned(), by.clone());
         progress.write(&folder.join(STATE)).unwrap();
-        let other = record(folder, Stage::Crossing, passed(), &rig, None).unwrap_err();
+        let other = record(folder, Stage::Crossing, passed(), &rig, None).unwrap_err().to_string();
         assert!(other.contains("preload_full_scale_n = 200"), "{other}");
-        rig.rig.sense.preload_full_scale_n = 199.5 * (1.0 + 1e-7);
+        rig.rig.sense.preload_full_scale_n = 199.5;
         for stage in [Stage::Acceptance, Stage::Crossing] {
             record(folder, stage, passed(), &rig, None).unwrap();
         }
         assert!(
-            lacking(folder)
+            lacking(Some(&folder.join(MINE)))
                 .unwrap()
                 .ends_with(&format!("friction, identification ({})", folder.display()))
         );

@@ -3,7 +3,7 @@
 use interstage::log::Record;
 use interstage::supervise::Mode;
 
-use super::figures::{Scale, angle, counted, mean, preload_n, turned};
+use super::figures::{Scale, angle, counted, mean, turned};
 use super::line::{Motion, press};
 use super::motion::{CHANGED, bridge, driven, fault};
 use super::{BringupError, Check, Session, check};
@@ -11,8 +11,8 @@ use super::{BringupError, Check, Session, check};
 /// Duty of the pre-tightener, and the steps of preload, ms.
 pub(super) const PRESS: f64 = 0.25;
 const STEPS_MS: [u32; 3] = [550, 850, 550];
-/// Factor by which a tread of the stated name may be stiffer or softer.
-const TREAD: f64 = 1.5;
+/// Factor by which the rate may differ: screw, spring or the preload sensor's scale.
+const RATE: f64 = 2.0;
 /// Rest behind a step, ms; the tread's memory is a tenth of a second. Its second half is judged.
 pub(super) const REST_MS: u32 = 500;
 
@@ -20,9 +20,7 @@ pub(super) const REST_MS: u32 = 500;
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Level {
     pub(super) preload: f64,
-    compression: f64,
-    /// Compression from the zero that the controller has taken.
-    pressed: f64,
+    pub(super) compression: f64,
     angle: f64,
 }
 
@@ -33,7 +31,6 @@ impl Level {
         Self {
             preload: mean(last().map(|row| scale.preload(row))).0,
             compression: mean(last().map(|row| scale.compression(row))).0,
-            pressed: mean(last().map(|row| row.telemetry.compression.to_num())).0,
             angle: first + mean(last().map(|row| turned(first, angle(row)))).0,
         }
     }
@@ -42,7 +39,6 @@ impl Level {
         Self {
             preload: self.preload - before.preload,
             compression: self.compression - before.compression,
-            pressed: self.pressed,
             angle: turned(before.angle, self.angle),
         }
     }
@@ -52,7 +48,7 @@ impl Level {
     }
 
     fn text(self) -> String {
-        let Self { preload, compression, angle, .. } = self;
+        let Self { preload, compression, angle } = self;
         format!(
             "preload {preload:+.2} N, compression {compression:+.4} mm, angle {angle:+.1} codes"
         )
@@ -152,18 +148,6 @@ fn rises(
 fn judge(session: &mut Session<'_, '_>, levels: &[(f64, Level)]) -> Vec<Check> {
     let rig = &session.expected.rig;
     let [(t_1, first), (t_2, second), (t_3, last)] = levels else { return Vec::new() };
-    let power = (last.compression / first.compression).ln() / (last.preload / first.preload).ln();
-    let exchanged = power.is_nan() || power >= 1.0;
-    let mut checks = vec![check(
-        "preload against tread",
-        !exchanged,
-        format!("compression grows as preload^{power:.2}"),
-        "preload and compression sensor are exchanged: a tread grows stiffer under load (0.67), \
-         these show it the other way round. Swap PC2 and PC3",
-    )];
-    if exchanged {
-        return checks;
-    }
     let inwards = last.angle < 0.0;
     let advice = if inwards {
         "the arm's codes grow inwards: turn the magnet over, then measure sense.angle_zero_code"
@@ -171,7 +155,7 @@ fn judge(session: &mut Session<'_, '_>, levels: &[(f64, Level)]) -> Vec<Check> {
         "the arm's code does not follow the tread's compression: the magnet turns with the arm, \
          and the sensor does not?"
     };
-    checks.push(check("arm direction", last.angle > 1.0, last.text(), advice));
+    let mut checks = vec![check("arm direction", last.angle > 1.0, last.text(), advice)];
     // Two durations give rate and dead time, P = slew u (T - D); the outer steps are alike.
     let (short, long) =
         (last.preload - second.preload + first.preload, second.preload - first.preload);
@@ -179,45 +163,23 @@ fn judge(session: &mut Session<'_, '_>, levels: &[(f64, Level)]) -> Vec<Check> {
     let slew = (long - short) / (PRESS * (t_2 - t_short));
     let dead_s = t_short - short / (PRESS * slew);
     let by_spring = slew / rig.preload.slew_n_per_s;
-    // Differences: the arm's thrust presses the wheel as well.
-    let carried = preload_n(rig, last.pressed) - preload_n(rig, first.pressed);
-    let by_tread = (last.preload - first.preload) / carried;
-    // Rubber of one name differs by more than springs and motors do.
-    let off = |ratio: f64| !(0.8..=1.25).contains(&ratio);
-    let off_tread = !(1.0 / TREAD..=TREAD).contains(&by_tread);
     let rounded = (slew * 10.0).round() / 10.0;
-    let advice = if off(by_spring) && off(by_tread) && (by_spring > 1.0) == (by_tread > 1.0) {
-        format!(
-            "the preload sensor's scale is wrong by {:.2}, or spring and tread both are: hang a \
-             known weight on it and set sense.preload_full_scale_n = {:.0}",
-            (by_spring * by_tread).sqrt(),
-            rig.sense.preload_full_scale_n / (by_spring * by_tread).sqrt(),
-        )
-    } else if off_tread {
-        "the compression sensor's scale is wrong, or the tread is another: press it by a feeler \
-         gauge; `rig identify` finds the tread"
-            .to_owned()
-    } else {
-        format!(
-            "the pre-tightener is of another speed or spring: set preload.slew_n_per_s = {rounded}"
-        )
-    };
-    if !off(by_spring) {
+    let near = (1.0 / RATE..=RATE).contains(&by_spring);
+    if near {
         session.proposed.rig.preload.slew_n_per_s = rounded;
         // The outer steps differ by what does not repeat.
         let repeats = (last.preload - second.preload - first.preload).abs();
         let within = 0.1 + repeats / (PRESS * (t_2 - t_short));
         session.measured("preload.slew_n_per_s", rounded, within, "three steps");
     }
-    checks.push(check(
-        "preload scale",
-        !off(by_spring) && !off_tread,
-        format!(
-            "{slew:.1} N/s at full duty ({by_spring:.2} of the parameter), {by_tread:.2} of the \
-             tread's stiffness, dead time and lag {dead_s:.3} s"
-        ),
-        &advice,
-    ));
+    let shown = format!(
+        "{slew:.1} N/s at full duty ({by_spring:.2} of the parameter), dead time and lag {dead_s:.3} s"
+    );
+    let advice = format!(
+        "the pre-tightener is of another speed or spring, or the preload sensor of another scale: \
+         press it by a known force. If it shows that, set preload.slew_n_per_s = {rounded}"
+    );
+    checks.push(check("preload rate", near, shown, &advice));
     checks
 }
 

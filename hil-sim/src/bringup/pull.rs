@@ -18,9 +18,6 @@ const PULL_MS: u32 = 1000;
 /// Preload, N, at which the pressing ends, and most motions up to there.
 const PRESSED_N: f64 = 12.0;
 const MOTIONS: u32 = 3;
-/// Friction that any tread has: by a force for half of it, it moves less than this, mm.
-const LEAST: f64 = 0.4;
-const STANDS_MM: f64 = 0.05;
 /// Parts of the free speed between which it slips.
 const SLIPS: (f64, f64) = (0.1, 0.97);
 /// Frictions of rubber on metal, from wet to clean.
@@ -70,31 +67,19 @@ pub(super) fn run(session: &mut Session<'_, '_>) -> Result<Vec<Check>, BringupEr
     pull(session, FAST)?;
     let arm = (rig.centre_radius_mm(0) - rig.rig.arm_pivot_radius_mm) / rig.rig.arm_length_mm;
     let thrust = rig.plant.arm_coupling * arm / (1.0 - arm * arm).sqrt();
-    let least = 0.5 * LEAST * preload / (1.0 + thrust.max(0.0) * LEAST);
-    let (held, _, first_fault) = pull(session, FAST - free / no_load + least / stall)?;
-    let stood = 0.5e-3 * f64::from(PULL_MS) * held;
     let (first, ..) = pull(session, FAST)?;
-    let (second, after, last_fault) = pull(session, FAST)?;
-    let faults = first_fault + &last_fault;
+    let (second, after, fault) = pull(session, FAST)?;
     let (left, _) = release(session, base, &scale, pressed_ms)?;
-    let mut checks = vec![check(
-        "pull holds",
-        stood.abs() < STANDS_MM && preload >= 0.8 * PRESSED_N,
-        format!("{stood:.3} mm at {least:.1} N, {preload:.1} N of preload{faults}"),
-        "the wheel rolls: the carriage is not on its stop at the stow end, or the wheel is not on \
-         the wall",
-    )];
     let part = 0.5 * (first + second) / free;
-    if checks[0].ok {
-        checks.push(check(
-            "pull slips",
-            (SLIPS.0..SLIPS.1).contains(&part) && faults.is_empty(),
-            format!("{:.0} % of its free speed{faults}", 100.0 * part),
-            "near its free speed the wheel does not touch the wall; near rest 30 % is too little, \
-             or something holds the drive",
-        ));
-    }
-    if checks.iter().any(|check| !check.ok) {
+    let pressed = preload >= 0.8 * PRESSED_N;
+    let mut checks = vec![check(
+        "pull slips",
+        pressed && (SLIPS.0..SLIPS.1).contains(&part) && fault.is_empty(),
+        format!("{:.0} % of its free speed at {preload:.1} N{fault}", 100.0 * part),
+        "near its free speed the wheel rolls: the carriage is not on its stop at the stow end, or \
+         the wheel not on the wall. Near rest 30 % is too little, or something holds the drive",
+    )];
+    if !checks[0].ok {
         return Ok(checks);
     }
     let lacks = (1.0 - part) * free / no_load;

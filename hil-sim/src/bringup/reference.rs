@@ -3,12 +3,12 @@
 
 use interstage::rig::Rig;
 
-use super::figures::{Scale, mean};
+use super::figures::Scale;
+use super::pretightener::Level;
 use super::{Action, BringupError, Check, Sensor, Session, check};
 
-/// Rows that are judged, and those in which a hand's motion dies away.
-const ROWS: u32 = 500;
-const CALM_ROWS: u32 = 300;
+/// Rows of a level.
+const CALM_ROWS: u32 = 800;
 /// Part by which the two may disagree, and by which the full scale may be off.
 const DISAGREE: f64 = 0.02;
 const OFF: f64 = 0.05;
@@ -21,7 +21,7 @@ pub(super) struct Reference {
     what: &'static str,
     unit: &'static str,
     key: &'static str,
-    /// How well it is known: part, and in the unit.
+    /// How well it is known: part, and in the unit, with the noise.
     known: (f64, f64),
     full_scale: fn(&mut Rig) -> &mut f64,
 }
@@ -32,7 +32,7 @@ pub(super) const WEIGHT: Reference = Reference {
     what: "weight",
     unit: "N",
     key: "sense.preload_full_scale_n",
-    known: (0.005, 0.0),
+    known: (0.005, 0.03),
     full_scale: |rig| &mut rig.sense.preload_full_scale_n,
 };
 pub(super) const GAUGE: Reference = Reference {
@@ -50,15 +50,15 @@ pub(super) fn run(
     of: &Reference,
 ) -> Result<Vec<Check>, BringupError> {
     session.operator.act(Action::LiftOff)?;
-    let (none, noise) = level(session, of)?;
+    let none = level(session, of)?;
     // What is known, and what the sensor shows of it.
     let mut points = [(0.0, 0.0); 2];
     for (is_second, point) in [false, true].into_iter().zip(&mut points) {
-        *point = (session.operator.put(of.sensor, is_second)?, level(session, of)?.0 - none);
+        *point = (session.operator.put(of.sensor, is_second)?, level(session, of)? - none);
     }
     session.operator.act(Action::TakeOff(of.sensor))?;
     // What is left after the way up and down does not belong to the scale.
-    let left = (level(session, of)?.0 - none).abs() + noise;
+    let left = (level(session, of)? - none).abs();
     let full_scale = (of.full_scale)(&mut session.proposed.rig);
     let (checks, found) = judge(of, points, left, *full_scale);
     if let Some((value, within)) = found {
@@ -68,14 +68,11 @@ pub(super) fn run(
     Ok(checks)
 }
 
-/// Mean of the sensor, and three deviations of that mean.
-fn level(session: &mut Session<'_, '_>, of: &Reference) -> Result<(f64, f64), BringupError> {
-    let scale = Scale::of(&session.proposed.rig);
-    session.line.listen(CALM_ROWS)?;
-    let rows = session.line.listen(ROWS)?;
-    let read = if of.sensor == Sensor::Preload { Scale::preload } else { Scale::compression };
-    let (value, deviation) = mean(rows.iter().map(|row| read(&scale, row)));
-    Ok((value, 3.0 * deviation / (rows.len().max(1) as f64).sqrt()))
+/// What the sensor shows, once a hand's motion has died away.
+fn level(session: &mut Session<'_, '_>, of: &Reference) -> Result<f64, BringupError> {
+    let rows = session.line.listen(CALM_ROWS)?;
+    let Level { preload, compression, .. } = Level::of(&rows, &Scale::of(&session.proposed.rig));
+    Ok(if of.sensor == Sensor::Preload { preload } else { compression })
 }
 
 /// The checks, and the full scale with half its interval if all have passed.

@@ -45,8 +45,8 @@ pub struct Args {
     again: bool,
 
     /// Records the first crossing, by the log of a deployment at 5 mm/s: log.mcap, or its folder.
-    #[arg(long, value_name = "LOG", conflicts_with_all = ["yes", "again", "mistake", "file"])]
-    log: Option<PathBuf>,
+    #[arg(long, value_name = "LOG")]
+    pub log: Option<PathBuf>,
 
     /// A mistake in the emulated board's wiring, to be found; may be given several times.
     #[arg(long, value_name = "NAME")]
@@ -92,7 +92,7 @@ fn crossed(args: &Args, log: &Path) -> Result<Outcome, Failure> {
     let progress = gates::record(&args.out, Stage::Crossing, gate.clone(), &scenario, None);
     let progress = progress.map_err(Failure::input)?;
     write_text(&args.out.join("report.html"), &bringup::html(&progress))?;
-    let lacking = gates::lacking(&args.out).unwrap_or_default();
+    let lacking = gates::lacking(Some(&args.out.join(gates::MINE))).unwrap_or_default();
     let printed = json!({ "complete": gate.ok, "checks": [gate], "lacking": lacking });
     let text = || format!("{}: {}\n{}{lacking}\n", gate.name, gate.measured, gate.advice);
     output::result(args.json, &printed, text)?;

@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 use clap::builder::PossibleValuesParser;
 
 use super::failure::Failure;
-use crate::bringup::gates;
 use crate::scenario::{ControllerKind, PRESETS, Scenario};
 
 /// Which rig.
@@ -97,15 +96,6 @@ pub(super) fn remind(what: &str, scenario: &Scenario) {
 pub(super) fn seed(text: &str) -> Result<u64, &'static str> {
     let seed = text.parse().ok().filter(|seed| *seed <= i64::MAX as u64);
     seed.ok_or("expected a whole number, 0 or more, at most 9223372036854775807")
-}
-
-/// Says which gates the rig of this scenario file has not passed: that of its folder, or the usual
-/// one.
-pub(super) fn remind_gates(what: &str, file: Option<&Path>) {
-    let beside = file.and_then(Path::parent).filter(|at| at.join(gates::STATE).exists());
-    if let Some(lacks) = gates::lacking(beside.unwrap_or(Path::new(gates::FOLDER))) {
-        eprintln!("{what}: {lacks}");
-    }
 }
 
 impl RunArgs {

@@ -4,7 +4,8 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 
 use super::failure::{Failure, Outcome};
-use super::scenario::{RunArgs, remind, remind_gates};
+use super::scenario::{RunArgs, remind};
+use crate::bringup::gates;
 use crate::provision::Extra;
 use crate::record::{Bytes, Probed, Source, Virtual};
 use crate::scenario::Scenario;
@@ -47,7 +48,9 @@ impl SourceArgs {
             _ => {
                 let port = super::probe::reconnecting()?;
                 remind("the rig at the probe", &scenario);
-                remind_gates("the rig at the probe", self.run.scenario.file());
+                if let Some(lacking) = gates::lacking(self.run.scenario.file()) {
+                    eprintln!("the rig at the probe: {lacking}");
+                }
                 act(&mut Probed::new(port), &scenario)
             }
         }

@@ -69,12 +69,8 @@ impl VirtualRig {
     fn pressing(&self, local: &LocalWall) -> (f64, f64) {
         let base = local.base_mm - self.eccentric().1;
         let seat = self.preload.seat_n() + self.parameters.spring_n_per_mm * base;
-        (
-            seat,
-            self.thrust_ratio() * self.thrust_n + self.pivot.force_n()
-                - self.vibration_n
-                - self.hung_n,
-        )
+        let arm = self.thrust_ratio() * self.thrust_n + self.pivot.force_n();
+        (seat, arm - self.vibration_n - self.hung_n)
     }
 
     /// Radial balance over this wall.

@@ -48,19 +48,13 @@ impl VirtualRig {
     }
 
     /// Rests the carriage on its stop and the wheel, clear of the wall, on its spring, with a weight
-    /// on it that pulls with this force, N.
-    pub fn hang(&mut self, force_n: f64) {
-        (self.hung_n, self.latched) = (force_n, true);
-        let lift = (force_n - self.preload.seat_n()) / self.parameters.spring_n_per_mm;
+    /// on it that pulls with this force, N, and a gauge under the compression sensor, mm.
+    pub fn lift(&mut self, hung_n: f64, gauge_mm: Option<f64>) {
+        (self.hung_n, self.gauge_mm, self.latched) = (hung_n, gauge_mm, true);
+        let lift = (hung_n - self.preload.seat_n()) / self.parameters.spring_n_per_mm;
         let radius = self.parameters.ring.radius_mm + self.eccentric().1;
         self.truth.height_mm = radius + lift.max(self.base_mm);
         self.settle_timer.for_s = 0.0;
-        self.derive();
-    }
-
-    /// Puts a gauge of this thickness, mm, under the compression sensor, or takes it out.
-    pub fn gauge(&mut self, thickness_mm: Option<f64>) {
-        self.gauge_mm = thickness_mm;
         self.derive();
     }
 
