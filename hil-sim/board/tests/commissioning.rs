@@ -207,11 +207,7 @@ fn unknown_rigs_are_commissioned_and_accepted() {
         [0, 1].map(|first| scope.spawn(move || every_second(first))).map(|half| half.join())
     });
     let found: Vec<_> = found.into_iter().flat_map(|half| half.expect("a verdict")).collect();
-    println!("{found:#?}");
-    let few = |of: usize| {
-        let rigs = found.iter().filter(|(_, told)| !told[of].is_empty()).count();
-        20 * rigs <= found.len()
-    };
-    assert!(few(0) && few(1), "{found:#?}");
-    assert!(found.iter().all(|(_, told)| told[2].is_empty()), "{found:#?}");
+    let told = |of| found.iter().filter(|(_, told)| !told[of].is_empty()).count();
+    assert!(20 * told(0) <= found.len() && 20 * told(1) <= found.len(), "{found:#?}");
+    assert_eq!(told(2), 0, "{found:#?}");
 }

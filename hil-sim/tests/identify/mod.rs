@@ -19,11 +19,10 @@ fn all_hidden_parameters_of_19_rigs_of_20_lie_within_their_intervals() {
         hidden::found(seed, |name, of| of(lines.entry(name.to_owned()).or_default()));
     }
     assert_eq!(lines.len(), 19);
-    for (name, line) in &lines {
-        // Two of a hundred rigs have a run that does not start.
-        assert!(line.identified + cases as usize / 20 >= cases as usize, "{name}: {line:?}");
-    }
-    let outside: BTreeSet<u64> = lines.values().flat_map(|line| line.outside.clone()).collect();
+    // Two of a hundred rigs have a run that does not start.
+    let least = cases as usize - cases as usize / 20;
+    assert!(lines.values().all(|line| line.identified >= least), "{lines:#?}");
+    let outside: BTreeSet<_> = lines.values().flat_map(|line| &line.outside).collect();
     assert!(20 * outside.len() as u64 <= cases, "{outside:?}: {lines:#?}");
     let tread = Scenario::default().rig.tread;
     for (name, value) in [
@@ -38,33 +37,6 @@ fn all_hidden_parameters_of_19_rigs_of_20_lie_within_their_intervals() {
         let median = line.half_widths[line.half_widths.len() / 2];
         assert!(median < 0.06 * value, "{name}: {line:?}");
     }
-}
-
-/// Rigs as identified are accepted; each that has changed since is not, by its name.
-#[test]
-fn a_rig_is_accepted_as_identified_and_not_once_it_has_changed() {
-    let changes: [hidden::Change; 8] = [
-        ("", |_| ()),
-        ("plant.mu", |p| p.mu *= 0.75),
-        ("rig.step_positions_mm[2]", |p| p.wall = p.wall.moved(&[0.0, 1.0, 0.0])),
-        ("tread.k_inf", |p| p.sensors.preload_sensor_gain *= 1.1),
-        ("plant.mu", |p| p.mu *= 1.25),
-        ("tread.k_inf", |p| (p.ring.k_inf, p.ring.k_0) = (1.2 * p.ring.k_inf, 1.2 * p.ring.k_0)),
-        ("tread.k_inf", |p| (p.ring.k_inf, p.ring.k_0) = (0.8 * p.ring.k_inf, 0.8 * p.ring.k_0)),
-        ("rig.step_positions_mm[1]", |p| p.wall = p.wall.moved(&[2.0; 3])),
-    ];
-    let (seeds, changes) = if long() { (20, &changes[..]) } else { (1, &changes[..3]) };
-    let mut refused = Vec::new();
-    for seed in 1_700_001..=1_700_000 + seeds {
-        let mut reasons = hidden::accepted(seed, changes).into_iter();
-        refused.extend(reasons.next().filter(|why| !why.is_empty()));
-        for ((name, _), why) in changes.iter().skip(1).zip(reasons) {
-            // Friction may show as slip, load or tread.
-            let named = why.iter().any(|why| why.starts_with(name) || *name == "plant.mu");
-            assert!(named, "seed {seed}, {name}: {why:?}");
-        }
-    }
-    assert!(20 * refused.len() as u64 <= seeds, "{refused:#?}");
 }
 
 /// Least squares of three gaps: better than the presets' tread by the same ring, and the
