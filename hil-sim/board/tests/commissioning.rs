@@ -207,7 +207,7 @@ fn unknown_rigs_are_commissioned_and_accepted() {
         [0, 1].map(|first| scope.spawn(move || every_second(first))).map(|half| half.join())
     });
     let found: Vec<_> = found.into_iter().flat_map(|half| half.expect("a verdict")).collect();
-    let told = |of| found.iter().filter(|(_, told)| !told[of].is_empty()).count();
+    let told = |of: usize| found.iter().filter(|(_, told)| !told[of].is_empty()).count();
     assert!(20 * told(0) <= found.len() && 20 * told(1) <= found.len(), "{found:#?}");
     assert_eq!(told(2), 0, "{found:#?}");
 }
