@@ -9,7 +9,7 @@ use super::motion::{CHANGED, bridge, driven, fault};
 use super::{BringupError, Check, Session, check};
 
 /// Duty of the pre-tightener, and the steps of preload, ms.
-pub(super) const PRESS: f64 = 0.25;
+const PRESS: f64 = 0.25;
 const STEPS_MS: [u32; 3] = [550, 850, 550];
 /// Factor by which the rate may differ: screw, spring or the preload sensor's scale.
 const RATE: f64 = 2.0;

@@ -7,7 +7,7 @@ use std::ops::ControlFlow;
 use super::figures::{Scale, counted, mean};
 use super::line::{drive, press};
 use super::motion::{driven, fault};
-use super::pretightener::{Level, PRESS, REST_MS, release};
+use super::pretightener::{Level, REST_MS, release};
 use super::{BringupError, Check, Session, check};
 
 /// Duties inwards: of a free wheel both, of the pull the second.
@@ -15,9 +15,10 @@ const SLOW: f64 = 0.15;
 const FAST: f64 = 0.30;
 /// Time of a motion, ms: 16 of the 20 mm that the service mode allows. Its second half is judged.
 const PULL_MS: u32 = 1000;
-/// Preload, N, at which the pressing ends, and most motions up to there.
+/// Duty of the pre-tightener, its longest motion, ms, and the preload, N, at which it ends.
+const PRESS: f64 = 0.40;
+const PRESS_MS: u32 = 2400;
 const PRESSED_N: f64 = 12.0;
-const MOTIONS: u32 = 3;
 /// Parts of the free speed between which it slips.
 const SLIPS: (f64, f64) = (0.1, 0.97);
 /// Frictions of rubber on metal, from wet to clean.
@@ -50,26 +51,19 @@ pub(super) fn run(session: &mut Session<'_, '_>) -> Result<Vec<Check>, BringupEr
         "Wheel on the wall: the PRE-TIGHTENER presses it to about {PRESSED_N} N, the DRIVE pulls \
          inwards against the stop, 30 % for 1 s three times, until the tread slips."
     ))?;
-    let (mut pressed_ms, mut preload) = (0, 0.0);
-    for _ in 0..MOTIONS {
-        let motion = session.line.move_and(press(PRESS), 2400, REST_MS, |line| {
-            let last = line.heard().iter().rev().take(20);
-            let is_pressed = mean(last.map(|row| scale.preload(row))).0 >= PRESSED_N;
-            Ok(if is_pressed { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
-        })?;
-        pressed_ms += driven(&motion, 1).len() as u32;
-        preload = Level::of(&motion.rows, &scale).since(base).preload;
-        if preload >= PRESSED_N {
-            break;
-        }
-    }
+    let motion = session.line.move_and(press(PRESS), PRESS_MS, REST_MS, |line| {
+        let last = line.heard().iter().rev().take(20);
+        let is_pressed = mean(last.map(|row| scale.preload(row))).0 >= PRESSED_N;
+        Ok(if is_pressed { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
+    })?;
+    let preload = Level::of(&motion.rows, &scale).since(base).preload;
     // The first pull takes up what room the stop has.
     pull(session, FAST)?;
     let arm = (rig.centre_radius_mm(0) - rig.rig.arm_pivot_radius_mm) / rig.rig.arm_length_mm;
     let thrust = rig.plant.arm_coupling * arm / (1.0 - arm * arm).sqrt();
     let (first, ..) = pull(session, FAST)?;
     let (second, after, fault) = pull(session, FAST)?;
-    let (left, _) = release(session, base, &scale, pressed_ms)?;
+    let (left, _) = release(session, base, &scale, 2 * PRESS_MS)?;
     let part = 0.5 * (first + second) / free;
     let pressed = preload >= 0.8 * PRESSED_N;
     let mut checks = vec![check(

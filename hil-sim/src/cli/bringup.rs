@@ -94,7 +94,7 @@ fn crossed(args: &Args, log: &Path) -> Result<Outcome, Failure> {
     write_text(&args.out.join("report.html"), &bringup::html(&progress))?;
     let lacking = gates::lacking(Some(&args.out.join(gates::MINE))).unwrap_or_default();
     let printed = json!({ "complete": gate.ok, "checks": [gate], "lacking": lacking });
-    let text = || format!("{}: {}\n{}{lacking}\n", gate.name, gate.measured, gate.advice);
+    let text = || [&gate.measured, &gate.advice, &lacking].map(|line| format!("{line}\n")).concat();
     output::result(args.json, &printed, text)?;
     Ok(Outcome::of(gate.ok))
 }

@@ -117,8 +117,12 @@ fn write(
         eprintln!("{}: replaces another result", directory.join(FILE).display());
     }
     files::make_directory(&directory)?;
-    let mut files = vec![directory.join(FILE)];
-    files::write_text(&files[0], &text)?;
+    // The parameters of a rig are in one file, which the gate writes.
+    let is_of_rig = directory.join(gates::STATE).exists();
+    let mut files = vec![directory.join(if is_of_rig { gates::MINE } else { FILE })];
+    if !is_of_rig {
+        files::write_text(&files[0], &text)?;
+    }
     for (index, record) in records.iter().enumerate() {
         let rows: Vec<&Residuals> =
             found.residuals.iter().filter(|of| of.log == record.name).collect();
