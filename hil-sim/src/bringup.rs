@@ -129,7 +129,7 @@ gates! {
     Crossing "first crossing", None =>
         "first crossing" | "`rig bringup --log` of it" | "every step at 5 mm/s, no fault, no slip";
     Identification "identification", None =>
-        "identified" | "`rig identify --out` this folder" | "tread and friction by 95 %";
+        "identified" | "`rig identify --out` this folder" | "tread and friction within intervals";
     Acceptance "acceptance", None =>
         "accepted" | "`rig accept --out` this folder" | "accepted";
 }
