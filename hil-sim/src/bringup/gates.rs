@@ -6,6 +6,7 @@ use std::path::Path;
 
 use super::{Check, GATES, Progress, Stage, check};
 use crate::files::write_text;
+use crate::identify::result::BY;
 use crate::record::Summary;
 use crate::scenario::Scenario;
 
@@ -36,7 +37,7 @@ pub fn crossed(run: &Summary, scenario: &Scenario) -> Check {
 /// Whether complete logs have shown tread and friction.
 pub fn identified(scenario: &Scenario, is_complete: bool) -> Check {
     let wanted = ["tread.k_inf_pa_per_m", "tread.stiffening", "tread.tau_s", "plant.mu"];
-    let by_logs = |key: &&str| scenario.sources.get(*key).is_some_and(|by| by.contains("95 %"));
+    let by_logs = |key: &&str| scenario.sources.get(*key).is_some_and(|by| by.contains(BY));
     let shown: Vec<&str> = wanted.into_iter().filter(by_logs).collect();
     let ok = is_complete && shown.len() == wanted.len();
     let advice = "give three complete logs, at 0.75, 1 and 1.2 times the cruise preload";
@@ -143,13 +144,17 @@ mod tests {
                 .ends_with(&format!("friction, identification ({})", folder.display()))
         );
         rig.rig.plant.mu = 0.93;
-        rig.sources.insert("plant.mu".to_owned(), "0.9 to 0.96, 95 %, by a".to_owned());
+        rig.sources.insert("plant.mu".to_owned(), format!("0.9 to 0.96{BY}a"));
         let found = record(folder, Stage::Identification, passed(), &rig, Some(&rig)).unwrap();
         assert!(!found.is_done(Stage::Acceptance) && found.is_done(Stage::Crossing));
         let mine = std::fs::read_to_string(folder.join(MINE)).unwrap();
         let mine = Scenario::parse(MINE, &mine, &[]).unwrap();
         assert_eq!((mine.rig.plant.mu, &mine.sources["sense.preload_full_scale_n"]), (0.93, &by));
         assert!(!identified(&mine, true).ok, "the tread is missing");
+        for key in ["k_inf_pa_per_m", "stiffening", "tau_s"] {
+            rig.sources.insert(format!("tread.{key}"), format!("1 to 2{BY}a"));
+        }
+        assert!(identified(&rig, true).ok && !identified(&rig, false).ok);
     }
 
     #[test]

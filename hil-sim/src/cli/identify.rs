@@ -88,7 +88,11 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     if let Some(folder) = args.out.as_deref().filter(|folder| folder.join(gates::STATE).exists()) {
         let gate = gates::identified(&found.scenario, found.is_complete);
         let (of, logged) = (Stage::Identification, &records[0].scenario);
+        let refused = (!gate.ok).then(|| format!("{}: {}", gate.measured, gate.advice));
         gates::record(folder, of, gate, logged, Some(&found.scenario)).map_err(Failure::input)?;
+        if let Some(why) = refused {
+            return Err(Failure::run(format!("identification is not passed; {why}")));
+        }
     }
     print(args, &found, &files)
 }

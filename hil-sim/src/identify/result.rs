@@ -28,6 +28,9 @@ const TICK_VARIANCE: f64 = 1.0 / 12.0;
 /// Evidence of a parameter that has none.
 const NOTHING: &str = "not in these logs";
 
+/// What stands between interval and logs in the source of a value that identification has found.
+pub const BY: &str = ", identified from ";
+
 /// A parameter with its interval: a rig's values are all within theirs with 95 %.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Parameter {
@@ -352,7 +355,7 @@ fn updated(scenario: &Scenario, parameters: &[Parameter], logs: &str) -> Scenari
     found.sources.extend(
         intervals
             .into_iter()
-            .map(|(key, all)| (key.to_owned(), format!("{}, by {logs}", all.join("; ")))),
+            .map(|(key, all)| (key.to_owned(), format!("{}{BY}{logs}", all.join("; ")))),
     );
     found
 }
@@ -431,7 +434,7 @@ mod tests {
         };
         let read = Scenario::parse("identified.toml", &found.to_toml(), &[]).unwrap();
         assert_eq!(read, after);
-        assert_eq!(read.sources["tread.tau_s"], "0.10 to 0.30, by a log");
+        assert_eq!(read.sources["tread.tau_s"], "0.10 to 0.30, identified from a log");
         assert!(!read.assumed().contains(&"tread.tau_s".to_owned()) && read.assumed().len() > 9);
     }
 }

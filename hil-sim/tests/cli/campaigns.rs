@@ -159,7 +159,7 @@ fn merged_parts_are_what_one_machine_prints_to_the_bit() {
         "faults --clean 3",
         "stress --cases 16",
         "envelope -n 2x2 --no-files",
-        "sweep --no-files --crossing --method fixed --key speed_mm_s=5,8,9",
+        "sweep --no-files --key drive.cruise_speed_mm_s=20,25,30",
         "compare -n 1 --no-oracle",
     ] {
         let at = &folder();

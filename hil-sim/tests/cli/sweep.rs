@@ -19,16 +19,13 @@ fn a_grid_of_deployments_has_rows_table_and_picture() {
     }
     // A slower tread opens a larger gap, also at the safe speed that gives the reference.
     assert!(number(&rows[4], "max_gap_mm") > number(&rows[0], "max_gap_mm") + 0.02);
-    let files: Vec<_> = found["files"]
-        .as_array()
-        .unwrap()
-        .iter()
-        .map(|file| at.join(file.as_str().unwrap()))
-        .collect();
-    let table = std::fs::read_to_string(&files[0]).unwrap();
+    let read = |file: usize| {
+        std::fs::read_to_string(at.join(found["files"][file].as_str().unwrap())).unwrap()
+    };
+    let table = read(0);
     assert_eq!(table.lines().count(), 7);
     assert!(table.starts_with("tread.tau_s,run.controller,completed,max_gap_mm,"), "{table}");
-    let picture = std::fs::read_to_string(&files[1]).unwrap();
+    let picture = read(1);
     for text in ["Worst gap", "Duration", "slip", "tread.tau_s", "run.controller = constant"] {
         assert!(picture.contains(text), "{text}");
     }
@@ -37,7 +34,7 @@ fn a_grid_of_deployments_has_rows_table_and_picture() {
     let output = rig_in(at, &other);
     let text = stdout(&output);
     assert!(text.contains("-2/: sweep.csv") && text.contains("\n 0.1  "), "{text}");
-    assert_eq!(std::fs::read_to_string(&files[0]).unwrap(), table);
+    assert_eq!(read(0), table);
 }
 
 #[test]

@@ -25,12 +25,9 @@ fn all_hidden_parameters_of_19_rigs_of_20_lie_within_their_intervals() {
     let outside: BTreeSet<_> = lines.values().flat_map(|line| &line.outside).collect();
     assert!(20 * outside.len() as u64 <= cases, "{outside:?}: {lines:#?}");
     let tread = Scenario::default().rig.tread;
-    for (name, value) in [
-        ("tread.k_inf_pa_per_m", tread.k_inf_pa_per_m),
-        ("tread.stiffening", tread.stiffening),
-        ("tread.tau_s", tread.tau_s),
-    ] {
-        let line = lines.get_mut(name).expect(name);
+    let values = [tread.k_inf_pa_per_m, tread.stiffening, tread.tau_s];
+    for (name, value) in ["k_inf_pa_per_m", "stiffening", "tau_s"].into_iter().zip(values) {
+        let line = lines.get_mut(&format!("tread.{name}")).expect(name);
         assert!(line.worst_rel < 0.05, "{name}: {line:?}");
         // An interval that holds everything says nothing.
         line.half_widths.sort_by(f64::total_cmp);
