@@ -28,8 +28,8 @@ case " $wanted " in *" picture "* | "  ")
     ;;
 esac
 write retract deploy --retract --no-files
-write montecarlo montecarlo -n 1000 --seed 26000000
-write montecarlo-retract montecarlo -n 1000 --retract --seed 26010000
+write montecarlo montecarlo -n 1000 --seed 31000000
+write montecarlo-retract montecarlo -n 1000 --retract --seed 31010000
 write compare compare -n 200
 write envelope envelope --out target/figures
 [ ! -f target/figures/envelope.svg ] || cp target/figures/envelope.svg docs/envelope.svg
