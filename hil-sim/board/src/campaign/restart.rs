@@ -14,7 +14,8 @@ use hil_sim::plant::rig::Truth;
 use hil_sim::scenario::Scenario;
 use hil_sim::session::RunningRig;
 
-/// Most motion from the reset to the command, mm: the wheel coasts when its motor loses power.
+/// Most motion from the reset to the command, mm: the wheel coasts when its motor loses power. An axle
+/// that moves on the rubber of a wheel that stands is held.
 const MOTION_MM: f64 = 0.5;
 /// Longest time from a hang to the cut of the bridges, s. If another task than the tick hangs,
 /// the run stays under control until the task has been missed for 50 ms; 80 ms later the system
@@ -91,7 +92,8 @@ impl Hold {
         let (Some(struck), Some(reset), Some(last)) = (self.struck, self.reset, self.last) else {
             return vec!["no hold after the reset".to_owned()];
         };
-        let motion_mm = (last.position_mm - reset.position_mm).abs();
+        let turned_mm = scenario.rig.rig.wheel_radius_mm * (last.rotation_rad - reset.rotation_rad);
+        let motion_mm = (last.position_mm - reset.position_mm).abs().min(turned_mm.abs());
         let hung_mm = (reset.position_mm - struck.position_mm).abs();
         let hung_n = (reset.preload_n - struck.preload_n).abs();
         let preload_n = (last.preload_n - reset.preload_n).abs();
