@@ -7,15 +7,11 @@ use crate::numeric::{between, divide};
 use crate::supervise::{Mode, Trigger};
 use crate::units::{
     Direction, Millimetres, MillimetresPerSecond, MotorCommand, Newtons, NewtonsPerSecond, Q16,
-    Ratio, per_tick, q16,
+    Ratio, q16,
 };
 
 /// Slope below which a corner does not limit the speed.
 pub(super) const LEVEL_SLOPE: Ratio = q16(50_000);
-/// Speed per distance at which a wheel that brakes comes back to its profile, 1/s: the crossover of the
-/// speed loop. Farther off than this, mm, its place has been corrected.
-const CLOSES: Q16 = q16(20_000_000);
-const MOST_BEHIND: Millimetres = q16(250_000);
 
 impl Controller {
     /// Where the wheel is on its run.
@@ -192,7 +188,7 @@ impl Controller {
         // Only detected corners are fed forward: the table may be wrong. The feed-forward is
         // blended in, or the drive would jump.
         let (blend, added) = state.blend_corner();
-        let wanted = state.outwards(state.profile.speed()) + self.to_profile(state, targets.speed);
+        let wanted = state.outwards(state.profile.speed()) + state.to_profile(targets.speed);
         let (climb, drift) = match blend {
             Q16::ZERO => (Q16::ZERO, Q16::ZERO),
             _ => self.corner(state, tick, targets.speed),
@@ -207,20 +203,6 @@ impl Controller {
         let load = level + climb + self.inertia * state.outwards(state.profile.acceleration());
         let duty = self.speed_loop.step(&mut state.speed_loop, wanted, measured, load);
         (MotorCommand::on(duty), self.regulate(state, tick, targets, drift))
-    }
-
-    /// Speed that brings a wheel which brakes to rest back to where its profile has it, mm/s outwards.
-    fn to_profile(&self, state: &mut State, target: MillimetresPerSecond) -> MillimetresPerSecond {
-        let (position, speed) =
-            (state.estimate.position.widen(), state.outwards(state.profile.speed()));
-        let brakes = target == Q16::ZERO && speed != Q16::ZERO;
-        if !brakes || !matches!(state.mode, Mode::Run(..)) {
-            state.brake_position = None;
-            return Q16::ZERO;
-        }
-        let planned = state.brake_position.unwrap_or(position).saturating_add(per_tick(speed));
-        state.brake_position = Some(planned);
-        Q16::narrow(planned.saturating_sub(position)).clamp(-MOST_BEHIND, MOST_BEHIND) * CLOSES
     }
 
     /// Force that a corner needs of the drive, N, and the rate at which it moves the spring, N/s.

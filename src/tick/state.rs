@@ -11,8 +11,13 @@ use crate::model::{Learned, Plan, Review};
 use crate::sense::{SensesState, Zeros};
 use crate::supervise::service::ServiceState;
 use crate::supervise::{Leg, Mode, MonitorState};
-use crate::units::{Direction, Millimetres, Newtons, Q16, Ratio, Tick, Travel};
+use crate::units::{
+    Direction, Millimetres, MillimetresPerSecond, Newtons, Q16, Ratio, Tick, Travel, per_tick, q16,
+};
 
+/// How a braking wheel closes on its profile: rate, 1/s, the speed loop's crossover; most, mm.
+const CLOSES: Q16 = q16(20_000_000);
+const MOST_BEHIND: Millimetres = q16(250_000); // Farther off, its place has been corrected.
 /// Ticks over which the feed-forward of a detected corner is blended in.
 const BLEND_TICKS: u8 = 32;
 
@@ -115,6 +120,19 @@ impl State {
         if self.estimate.direction == Direction::Deploy { along } else { -along }
     }
 
+    /// Speed that brings a wheel which brakes to rest back to where its profile has it, mm/s outwards.
+    pub(super) fn to_profile(&mut self, target: MillimetresPerSecond) -> MillimetresPerSecond {
+        let (position, speed) =
+            (self.estimate.position.widen(), self.outwards(self.profile.speed()));
+        if target != Q16::ZERO || speed == Q16::ZERO || !matches!(self.mode, Mode::Run(..)) {
+            self.brake_position = None;
+            return Q16::ZERO;
+        }
+        let planned = self.brake_position.unwrap_or(position).saturating_add(per_tick(speed));
+        self.brake_position = Some(planned);
+        Q16::narrow(planned.saturating_sub(position)).clamp(-MOST_BEHIND, MOST_BEHIND) * CLOSES
+    }
+
     /// Part of a corner's feed-forward that is blended in, 0 to 1, after one more tick, and what
     /// this tick adds to it.
     pub(super) fn blend_corner(&mut self) -> (Ratio, Ratio) {
@@ -166,7 +184,6 @@ impl State {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::units::q16;
 
     #[test]
     fn a_start_has_the_zeros_of_its_record() {

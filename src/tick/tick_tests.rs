@@ -49,6 +49,26 @@ proptest! {
     }
 }
 
+#[test]
+fn a_wheel_that_brakes_comes_back_to_where_its_profile_has_it() {
+    let controller = stiff();
+    let mode = Mode::Run(Direction::Deploy, Leg::Cruise);
+    let mut state = State { mode, ..State::default() };
+    (0..1000).for_each(|_| controller.profile.step(&mut state.profile, q16(20_000_000)));
+    let (mut profile_mm, mut wheel_mm) = (0.0, 0.0);
+    for tick in 0..1000 {
+        controller.profile.step(&mut state.profile, Q16::ZERO);
+        state.estimate.position = Q16::from_num(wheel_mm);
+        let speed = state.profile.speed();
+        let made_up = state.to_profile(Q16::ZERO);
+        profile_mm += 1e-3 * speed.to_num::<f64>();
+        // The tread gives way by 0.2 mm as braking begins.
+        wheel_mm += 1e-3 * (speed + made_up).to_num::<f64>() + if tick == 5 { 0.2 } else { 0.0 };
+    }
+    assert!((wheel_mm - profile_mm).abs() < 0.05, "{wheel_mm} {profile_mm}");
+    assert_eq!((state.brake_position, state.profile.speed()), (None, Q16::ZERO));
+}
+
 /// Every sensor answers, and the wheel is at rest.
 pub(super) fn answering() -> SensedState {
     let mut all = sensed(0, 0.0, 0.0);
