@@ -188,7 +188,7 @@ impl Controller {
         // Only detected corners are fed forward: the table may be wrong. The feed-forward is
         // blended in, or the drive would jump.
         let (blend, added) = state.blend_corner();
-        let wanted = state.outwards(state.profile.speed()) + state.to_profile(targets.speed);
+        let wanted = state.outwards(state.profile.speed()) + state.make_up(targets.speed);
         let (climb, drift) = match blend {
             Q16::ZERO => (Q16::ZERO, Q16::ZERO),
             _ => self.corner(state, tick, targets.speed),

@@ -121,7 +121,7 @@ impl State {
     }
 
     /// Speed that brings a wheel which brakes to rest back to where its profile has it, mm/s outwards.
-    pub(super) fn to_profile(&mut self, target: MillimetresPerSecond) -> MillimetresPerSecond {
+    pub(super) fn make_up(&mut self, target: MillimetresPerSecond) -> MillimetresPerSecond {
         let (position, speed) =
             (self.estimate.position.widen(), self.outwards(self.profile.speed()));
         if target != Q16::ZERO || speed == Q16::ZERO || !matches!(self.mode, Mode::Run(..)) {

@@ -60,7 +60,7 @@ fn a_wheel_that_brakes_comes_back_to_where_its_profile_has_it() {
         controller.profile.step(&mut state.profile, Q16::ZERO);
         state.estimate.position = Q16::from_num(wheel_mm);
         let speed = state.profile.speed();
-        let made_up = state.to_profile(Q16::ZERO);
+        let made_up = state.make_up(Q16::ZERO);
         profile_mm += 1e-3 * speed.to_num::<f64>();
         // The tread gives way by 0.2 mm as braking begins.
         wheel_mm += 1e-3 * (speed + made_up).to_num::<f64>() + if tick == 5 { 0.2 } else { 0.0 };
