@@ -1,4 +1,4 @@
-//! The checks, each true if the core did as it must.
+//! The checks, each true if the core did as it must, and the start that runs them.
 
 use core::arch::asm;
 use core::hint::black_box;
@@ -12,8 +12,35 @@ use embassy_stm32::pac::Interrupt;
 
 use crate::program::{BEATS, CALLS, NUMBER, conditional, float_across, note, order};
 
+/// One bit for each check that failed, in the order of [`ALL`].
+#[unsafe(no_mangle)]
+static FAILED: AtomicU32 = AtomicU32::new(u32::MAX);
+/// What the host gives to the conditional block, and what comes out of it.
+#[unsafe(no_mangle)]
+static GIVEN: AtomicU32 = AtomicU32::new(0);
+#[unsafe(no_mangle)]
+static RETURNED: AtomicU32 = AtomicU32::new(0);
+
+#[cortex_m_rt::entry]
+fn main() -> ! {
+    prepare();
+    let mut failed = 0;
+    for (bit, check) in ALL.iter().enumerate() {
+        if !check() {
+            failed |= 1 << bit;
+        }
+    }
+    FAILED.store(failed, Ordering::Relaxed);
+    loop {
+        op::bkpt();
+        // SAFETY: plain arithmetic.
+        let returned = unsafe { conditional(GIVEN.load(Ordering::Relaxed)) };
+        RETURNED.store(returned, Ordering::Relaxed);
+    }
+}
+
 /// Their order is known to the host.
-pub(crate) const ALL: [fn() -> bool; 15] = [
+const ALL: [fn() -> bool; 15] = [
     supervisor_calls,
     conditional_blocks,
     float_context,
@@ -32,7 +59,7 @@ pub(crate) const ALL: [fn() -> bool; 15] = [
 ];
 
 /// Priorities and enables.
-pub(crate) fn prepare() {
+fn prepare() {
     // SAFETY: nothing else runs yet.
     unsafe {
         let mut core = Peripherals::steal();

@@ -1,5 +1,5 @@
-//! Start and panic, what the host reads and writes, pieces whose every instruction matters, and the
-//! exceptions: each notes that it ran, and spoils what its hardware frame or its compiler has to keep.
+//! Pieces whose every instruction matters, and the exceptions: each notes that it ran, and spoils what
+//! its hardware frame or its compiler has to keep.
 
 use core::arch::{asm, global_asm};
 use core::sync::atomic::{AtomicU32, Ordering};
@@ -10,35 +10,6 @@ use cortex_m_rt::exception;
 use defmt as _;
 use embassy_stm32::interrupt;
 use embassy_stm32::pac::Interrupt;
-
-use crate::checks;
-
-/// One bit for each check that failed, in the order of [`checks::ALL`].
-#[unsafe(no_mangle)]
-static FAILED: AtomicU32 = AtomicU32::new(u32::MAX);
-/// What the host gives to the conditional block, and what comes out of it.
-#[unsafe(no_mangle)]
-static GIVEN: AtomicU32 = AtomicU32::new(0);
-#[unsafe(no_mangle)]
-static RETURNED: AtomicU32 = AtomicU32::new(0);
-
-#[cortex_m_rt::entry]
-fn main() -> ! {
-    checks::prepare();
-    let mut failed = 0;
-    for (bit, check) in checks::ALL.iter().enumerate() {
-        if !check() {
-            failed |= 1 << bit;
-        }
-    }
-    FAILED.store(failed, Ordering::Relaxed);
-    loop {
-        bkpt();
-        // SAFETY: plain arithmetic.
-        let returned = unsafe { conditional(GIVEN.load(Ordering::Relaxed)) };
-        RETURNED.store(returned, Ordering::Relaxed);
-    }
-}
 
 /// A breakpoint outside of `main` reports it to the host.
 #[panic_handler]
