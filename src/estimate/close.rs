@@ -3,12 +3,15 @@
 use super::landing::Landing;
 use super::{EstimateState, Estimator, Findings, OpenCrossing, Position, Slip};
 use crate::fault::{Fault, Limit};
-use crate::numeric::sqrt;
+use crate::numeric::{divide, sqrt};
 use crate::sense::SensedState;
-use crate::units::{Direction, Millimetres, Q16, q16};
+use crate::units::{Direction, Millimetres, Q16, Ratio, q16};
 
 /// Deviation of a step's height that is reported, mm: three of the angle's codes, and a sleeve's 0.05.
 const HEIGHT_SEEN: Millimetres = q16(120_000);
+/// How much of what a misread compression moves the face by is off, once it is known right over the edge:
+/// at a lift-off it may be anything from none to twice of that part, evenly spread.
+const PART_SIGMA: Ratio = q16(577_000);
 
 impl Estimator {
     /// Largest residual of a step that is where the table has it, mm: its tolerance, and what the
@@ -63,6 +66,26 @@ impl Estimator {
         }
     }
 
+    /// Right over an edge the wheel's fall below the upper wall is its compression.
+    pub(super) fn read_over_edge(&self, state: &mut EstimateState, sensed: &SensedState) {
+        let seen = self.watch_input(state, sensed);
+        let rise = self.watch.rise(&state.watch, state.direction, &seen);
+        let (step, beyond, fallen) = match state.direction {
+            Direction::Deploy => {
+                let Some(open) = state.crossing.as_ref() else { return };
+                let beyond = open.lift.is_some_and(|lift| state.position >= lift.face);
+                (open.step, beyond, self.steps.height - rise)
+            }
+            Direction::Retract => {
+                let beyond = self.distance(state).is_some_and(|ahead| ahead <= Q16::ZERO);
+                (state.next_step, beyond, rise)
+            }
+        };
+        if beyond && state.over.0 != step {
+            state.over = (step, [fallen + seen.compression, seen.compression]);
+        }
+    }
+
     /// A step whose wall behind it was not measured.
     pub(super) fn as_table(&self, gap_as_table: Millimetres) -> Measured {
         let (height, shift) = (self.steps.height, Q16::ZERO);
@@ -81,6 +104,7 @@ impl Estimator {
         let higher = measured.height - self.steps.height;
         state.raised += higher * Q16::from_num(state.direction.sign());
         let Some(mut open) = state.crossing else { return };
+        let retracts = state.direction == Direction::Retract;
         if let Some(mut point) = open.lift {
             if !open.resumed && !open.turned {
                 // How low the wall lies that takes a retracting wheel was not known at the lift.
@@ -96,6 +120,9 @@ impl Estimator {
                 });
                 let landing = landing.or(known);
                 let shift = landing.map_or(measured.shift, |landing| landing.face - point.face);
+                let missed = missed(state, open.step, higher);
+                let misread = point.leverage * missed.unwrap_or(Ratio::ZERO);
+                let shift = if retracts { shift } else { shift - misread };
                 if state.known.is_searching() && open.step > 0 {
                     self.count_down(state, sensed, &mut open);
                     found.advanced = true;
@@ -116,6 +143,15 @@ impl Estimator {
                         self.correct(state, sensed, (open.step, residual), found) - point.residual
                     }
                 };
+                if missed.is_some() {
+                    let part = if retracts { Ratio::ONE } else { PART_SIGMA };
+                    state.odometry.misread(state.direction, misread.abs() * part);
+                }
+                if let Some(climb) = open.climb.filter(|climb| climb.leverage > Q16::ZERO) {
+                    let leverage = climb.leverage + point.leverage;
+                    let sigma = leverage * missed.unwrap_or(Ratio::ZERO).abs() * PART_SIGMA;
+                    state.odometry.climb(state.position, &climb.since, climb.moved, sigma);
+                }
                 if let Some(landing) = landing.filter(|landing| landing.slid > Q16::ZERO) {
                     state.odometry.slip(Q16::ZERO, landing.sigma());
                     if higher > HEIGHT_SEEN && open.slide.may_unwind(landing.slid) {
@@ -164,6 +200,16 @@ impl Estimator {
         state.next_step = level;
         open.step = level + 1;
     }
+}
+
+/// Part of the compression on the edge of a step that the sensor misses, if the wheel was right over it. A
+/// wall that lies `higher`, mm, than its table moves the fall of a climbing wheel, measured from below.
+fn missed(state: &EstimateState, step: u8, higher: Millimetres) -> Option<Ratio> {
+    let (over, [fall, compression]) = state.over;
+    let higher = if state.direction == Direction::Retract { Q16::ZERO } else { higher };
+    let fall = fall + higher;
+    let part = divide(fall - compression, fall.max(compression).max(Q16::DELTA));
+    (step > 0 && over == step).then_some(part)
 }
 
 /// What the wall behind a step shows of the crossing.

@@ -4,6 +4,7 @@ use super::close::{Measured, slip_of};
 use super::crossing::{Contact, CrossingEvent, Lift, WatchInput};
 use super::landing::OnEdge;
 use super::odometry::Rolling;
+use super::state::Climb;
 use super::tread::Rolls;
 use super::wind_up::Pulled;
 use super::{EstimateState, Estimator, Expectation, Findings, LiftPoint, OpenCrossing, Position};
@@ -91,12 +92,16 @@ impl Estimator {
         }
         self.feel(state, tick.sensed);
         self.hold_to_corner(state, tick);
+        self.read_over_edge(state, tick.sensed);
         if state.watch.contact == Contact::Wall || state.known.is_searching() {
             let (travel, speed) = state.turns(tick.sensed);
             let (duty, pressed) = (tick.duty, tick.pressed);
             let compression = tick.sensed.compression_filtered;
             let rolls = Rolls { direction, travel, speed, duty, pressed, compression };
             found.shown = self.tread.roll(&mut state.tread, &rolls);
+            if let Some(shown) = found.shown {
+                state.odometry.doubt_tread((shown.rolled - Ratio::ONE).abs());
+            }
         }
         found
     }
@@ -334,8 +339,9 @@ impl Estimator {
         if ahead.abs() <= self.telling {
             let lift = open.lift.filter(|_| open.corrected);
             let climbs = lift.filter(|_| state.direction == Direction::Deploy);
-            if let Some(lift) = climbs.filter(|_| !core::mem::replace(&mut open.climbed, true)) {
+            if let Some(lift) = climbs.filter(|_| open.climb.is_none()) {
                 let moved = position + ahead - lift.face;
+                let mut climb = Climb { moved, ..Climb::default() };
                 if open.searched {
                     // The wheel may have begun on this corner, and lifted off elsewhere.
                     state.odometry.set_by_step(sensed.travel, state.position - moved);
@@ -344,8 +350,10 @@ impl Estimator {
                     open.slip.beside += moved;
                     state.odometry.slip(moved, Q16::ZERO);
                 } else {
-                    state.odometry.climb(state.position, moved);
+                    climb.leverage = self.watch.leverage(seen.compression, ahead);
+                    climb.since = state.odometry.since(state.position);
                 }
+                open.climb = Some(climb);
                 state.begin_tick(sensed.travel);
             }
             return;
@@ -412,6 +420,7 @@ impl Estimator {
             // As the odometry has it once this step has corrected it.
             face: face - (before - residual),
             residual,
+            leverage: self.watch.leverage(lift.depth, lift.distance),
         });
         state.crossing = Some(open);
         if open.step > 0 {

@@ -4,16 +4,19 @@
 
 #![deny(clippy::float_arithmetic)]
 
-use crate::numeric::{divide, sqrt};
-use crate::units::{Millimetres, Q16, Ratio, Travel, q16};
+use crate::numeric::{between, divide, sqrt};
+use crate::units::{Direction, Millimetres, Q16, Ratio, Travel, q16};
 
 /// Deviation of a step's place, mm: a sleeve is machined to 0.3 mm, evenly spread; its reciprocal.
 const PLACE: Millimetres = q16(173_205);
 const PER_PLACE: Q16 = q16(5_773_503);
 /// Variance of a known position over that of a step's place: 0.03 mm.
 const KNOWN: Ratio = q16(30_000);
-/// What the variance of the position grows by from step to step: 0.03 mm, on a corner above all.
+/// What the variance of the position grows by from step to step: 0.03 mm, on a corner above all; and a
+/// tenth of what the tread gives way by. So much more it creeps at one speed than at another, by its
+/// model, if it relaxes in a third of its time or in three times that.
 const WANDERS: Ratio = q16(30_000);
+const WANDERS_PART: Ratio = q16(100_000);
 /// The same of the travel after 64 mm while no step has shown the wheel's radius: 0.13 %, a wheel
 /// that is made and worn to 0.05 mm.
 const UNKNOWN_RADIUS: Ratio = q16(250_000);
@@ -24,15 +27,16 @@ const PER_REACH: Q16 = q16(15_625);
 const UNKNOWN_WINDING: Ratio = q16(1_333_000);
 /// The same of its creep, of the same compliance and of a contact that is 0.25 longer or shorter.
 const UNKNOWN_CREEP: Ratio = q16(4_080_000);
-/// Variance of where a step is found, over that of its place: as much again by how it is seen. From step
-/// to step that is off by 0.08 to 0.15 mm on virtual rigs as designed, and by 0.16 to 0.26 on wide ones.
-const FOUND: Ratio = q16(2_000_000);
-/// By how much all edges of a sleeve seem off together, mm, root mean square. On wide virtual rigs it is
-/// 0.21 deploying and 0.35 retracting; edges rounded by up to 0.5 mm, half of which shows, make 0.14.
-const ROUNDED: Millimetres = q16(220_000);
-/// Variance of how far an edge seems to move under a climbing wheel, over that of a step's place: 0.3 mm,
-/// of a sensor of the mean compression, and of rubber that is thicker than its elements.
-const EDGE: Ratio = q16(3_000_000);
+/// Variance of where a step is found, over that of its place: as that, and by how it is seen: two codes
+/// of the arm, 0.09 mm.
+const FOUND: Ratio = q16(1_250_000);
+/// By how much all edges of a sleeve seem off together, mm: rounded by up to 0.5 mm, of which half shows to
+/// a wheel that climbs, and most to one that comes down, evenly spread; and while none has shown what the
+/// compression sensor misses.
+const ROUNDED: [Millimetres; 2] = [q16(140_000), q16(250_000)];
+const UNREAD: Millimetres = q16(220_000);
+/// How far an edge seems to move under a climbing wheel, mm: two codes of the arm, as above.
+const EDGE: Millimetres = q16(90_000);
 /// Largest correction of the travel, relative.
 const MOST_SCALE: Ratio = q16(20_000);
 /// The same of winding up and creep.
@@ -60,8 +64,11 @@ pub struct Odometry {
     gave: [Millimetres; 2],
     /// Covariance of place, scale, creep and winding up.
     covariance: [[Ratio; STATES]; STATES],
-    /// Part of what all edges seem off by that the position has taken over.
+    /// By how much all edges may seem off together, mm, and the part of that in the position.
+    edges: Millimetres,
     by_edges: Ratio,
+    /// Part by which the tread carries more or less than by its model.
+    unlike: Ratio,
     /// Parts of the last residual that the position took over, and each of them.
     share: Ratio,
     gains: [Ratio; STATES],
@@ -88,7 +95,9 @@ impl Default for Odometry {
                 [zero, zero, UNKNOWN_CREEP, UNKNOWN_WINDING],
                 [zero, zero, UNKNOWN_WINDING, UNKNOWN_WINDING],
             ],
+            edges: UNREAD,
             by_edges: Ratio::ZERO,
+            unlike: Ratio::ZERO,
             share: Ratio::ZERO,
             gains: [Ratio::ZERO; STATES],
             mark: [Ratio::ONE, Ratio::ZERO, Ratio::ZERO, Ratio::ZERO],
@@ -128,7 +137,25 @@ impl Odometry {
     /// Declares that the wheel is at `position`.
     pub fn set(&mut self, travel: Travel, position: Millimetres) {
         let offset = position.widen().saturating_sub(travel);
-        *self = Self { offset, origin: position, ..Self::default() };
+        self.restart(Self { offset, origin: position, ..Self::default() });
+    }
+
+    /// Starts again like this, with what is known of tread and sensor.
+    fn restart(&mut self, fresh: Self) {
+        let unlike = self.unlike;
+        *self = Self { edges: self.edges, unlike: Ratio::ZERO, ..fresh };
+        self.doubt_tread(unlike);
+    }
+
+    /// The tread carries so much more or less than by its model, part of it: as much it may give way
+    /// otherwise, too.
+    pub(super) fn doubt_tread(&mut self, unlike: Ratio) {
+        let (before, now) = (self.unlike, between(unlike, self.unlike, Ratio::ONE));
+        self.unlike = now;
+        let more = now * now - before * before;
+        for row in &mut self.covariance[2..] {
+            row[2..].iter_mut().for_each(|part| *part += more * PER_PLACE * PER_PLACE);
+        }
     }
 
     /// Declares that the wheel is at `position`: a step was found there, as sure as its place.
@@ -147,13 +174,13 @@ impl Odometry {
         }
         let place = self.variance(position).max(KNOWN);
         let Self { offset, by_edges, .. } = *self;
-        *self = Self { offset, by_edges, origin: position, ..Self::default() };
+        self.restart(Self { offset, by_edges, origin: position, ..Self::default() });
         self.covariance[0][0] = place;
     }
 
     /// One sigma of `position`, mm.
     pub fn sigma(&self, position: Millimetres) -> Millimetres {
-        let (spread, edges) = (self.spread(position), ROUNDED * self.by_edges);
+        let (spread, edges) = (self.spread(position), self.edges * self.by_edges);
         sqrt(spread * spread + edges * edges)
     }
 
@@ -163,7 +190,8 @@ impl Odometry {
     }
 
     fn variance(&self, position: Millimetres) -> Ratio {
-        self.expect(&self.weights(position)).1
+        let weights = self.weights(position);
+        self.expect(&weights).1 + self.wander(&self.since(position))
     }
 
     /// How the states shift the position.
@@ -178,16 +206,29 @@ impl Odometry {
         (with, sum(&with, weights))
     }
 
-    /// The gains of a residual with these weights, whose variance is `noise`.
-    fn learn(&mut self, weights: &[Ratio; STATES], noise: Ratio) -> [Ratio; STATES] {
-        let (with, expected) = self.expect(weights);
-        let gains = with.map(|part| divide(part, noise + expected));
+    /// The gains of a residual with these weights, whose variance is `noise`; it shows what the position
+    /// has wandered by, of this variance.
+    fn learn(
+        &mut self,
+        weights: &[Ratio; STATES],
+        noise: Ratio,
+        wandered: Ratio,
+    ) -> [Ratio; STATES] {
+        let (mut with, expected) = self.expect(weights);
+        with[0] += wandered;
+        let gains = with.map(|part| divide(part, noise + expected + wandered));
         for (row, gain) in self.covariance.iter_mut().zip(gains) {
             for (part, other) in row.iter_mut().zip(with) {
                 *part -= gain * other;
             }
         }
         gains
+    }
+
+    /// Variance of the position by what it has wandered since then.
+    fn wander(&self, [.., crept, wound]: &[Ratio; STATES]) -> Ratio {
+        let part = self.unlike.max(WANDERS_PART) * PER_PLACE;
+        (*crept * *crept + *wound * *wound) * part * part
     }
 
     /// The tread creeps and winds up by so much, mm; by how much as far as the steps show.
@@ -207,21 +248,42 @@ impl Odometry {
     /// Takes over its part of the difference between where a step was found, near `position`, and
     /// where the table has it, mm; what is left of it.
     pub fn correct(&mut self, position: Millimetres, residual: Millimetres) -> Millimetres {
-        self.covariance[0][0] += WANDERS;
+        let wandered = self.wander(&self.since(position));
+        self.covariance[0][0] += wandered + WANDERS;
         self.mark = self.weights(position);
-        self.gains = self.learn(&self.mark.clone(), FOUND);
+        self.gains = self.learn(&self.mark.clone(), FOUND, Q16::ZERO);
         self.share = sum(&self.gains, &self.mark);
         self.by_edges += (Ratio::ONE - self.by_edges) * self.share;
         self.refine(residual)
     }
 
-    /// The edge that last corrected the position seems to have moved outwards by so much, mm, while the
-    /// wheel climbed to `position`: so far the tread gave way by more than its model has it.
-    pub fn climb(&mut self, position: Millimetres, moved: Millimetres) {
+    /// How the states shifted the position since a step last corrected it.
+    pub fn since(&self, position: Millimetres) -> [Ratio; STATES] {
         let weights = self.weights(position);
-        let since = core::array::from_fn(|i| weights[i] - self.mark[i]);
-        let gains = self.learn(&since, EDGE);
-        self.take(moved, sum(&gains, &weights), gains);
+        core::array::from_fn(|i| weights[i] - self.mark[i])
+    }
+
+    /// The edge that last corrected the position seems to have moved outwards by so much, give or take
+    /// `sigma`, mm, `since` then: so far the tread gave way by more than its model has it.
+    pub fn climb(
+        &mut self,
+        position: Millimetres,
+        since: &[Ratio; STATES],
+        moved: Millimetres,
+        sigma: Millimetres,
+    ) {
+        let parts = (sigma + EDGE).min(Millimetres::ONE) * PER_PLACE;
+        let wandered = self.wander(since);
+        self.covariance[0][0] += wandered;
+        self.mark = core::array::from_fn(|i| self.mark[i] + since[i]);
+        let gains = self.learn(since, parts * parts, wandered);
+        self.take(moved, sum(&gains, &self.weights(position)), gains);
+    }
+
+    /// All edges may seem off by so much, mm: a misread compression.
+    pub fn misread(&mut self, direction: Direction, by: Millimetres) {
+        let rounded = ROUNDED[direction as usize];
+        self.edges = sqrt(rounded * rounded + by * by);
     }
 
     /// The step found last lies `shift` further out than its residual had it, mm; what is left of
@@ -358,7 +420,15 @@ mod tests {
     fn least_squares(place: f64, found: &[([f64; STATES], f64)]) -> f64 {
         let prior = Odometry::default().covariance.map(|row| row.map(Q16::to_num::<f64>));
         let covariance = |i: usize, j: usize| {
-            let mut sum = place - prior[0][0] + WANDERS.to_num::<f64>() * (i.min(j) + 1) as f64;
+            let wanders: f64 = (0..=i.min(j))
+                .map(|k| {
+                    let before = k.checked_sub(1).map_or([0.0; STATES], |k| found[k].0);
+                    let gave = [2, 3].map(|n| found[k].0[n] - before[n]);
+                    let part = (WANDERS_PART * PER_PLACE).to_num::<f64>();
+                    WANDERS.to_num::<f64>() + part * part * (gave[0].powi(2) + gave[1].powi(2))
+                })
+                .sum();
+            let mut sum = place - prior[0][0] + wanders;
             for (a, row) in found[i].0.iter().zip(prior) {
                 sum += found[j].0.iter().zip(row).map(|(b, part)| a * b * part).sum::<f64>();
             }
@@ -437,7 +507,8 @@ mod tests {
             odometry.give([q16(2_000_000), Q16::ZERO]);
             // The axle lags by more than the model has it: the edge seems to move outwards.
             let position = odometry.position(Travel::ZERO);
-            odometry.climb(position, Q16::from_num(2.0 * part));
+            let since = odometry.since(position);
+            odometry.climb(position, &since, Q16::from_num(2.0 * part), Q16::ZERO);
             let (taken, more) = (position - odometry.position(Travel::ZERO), odometry.more[0]);
             let (taken, more) = (taken.to_num::<f64>() / (2.0 * part), more.to_num::<f64>() / part);
             assert!((0.5..1.0).contains(&taken) && (0.5..1.0).contains(&more), "{taken} {more}");

@@ -30,6 +30,7 @@ impl Estimator {
         state.direction = direction;
         state.leaving = None;
         state.odometry.begin_run(state.position, turned);
+        state.over.0 = 0;
         let carries = self.tread.means(Millimetres::ONE);
         self.pulls.begin(&mut state.wind_up, sensed.travel, load, carries);
         if let Some(open) = state.crossing.as_mut() {

@@ -35,7 +35,6 @@ pub struct EstimateState {
     pub(super) history: HistoryWriter,
     /// Preload behind the memory of the tread, N.
     pub(super) remembered: LowPassState,
-    /// Speed behind it.
     /// Direction of the run.
     pub direction: Direction,
     /// Level by steps detected.
@@ -56,6 +55,8 @@ pub struct EstimateState {
     pub(super) missed_in_a_row: u8,
     /// Steps climbed that the table lacks, since the stow end.
     pub(super) extra: u8,
+    /// Step that the wheel was right over, its fall below the upper wall there and its compression, mm.
+    pub(super) over: (u8, [Millimetres; 2]),
     /// By how much the walls passed lie further in than by the table, mm.
     pub(super) raised: Millimetres,
 }
@@ -79,8 +80,8 @@ pub struct OpenCrossing {
     pub corrected: bool,
     /// It has found the position.
     pub searched: bool,
-    /// What the edge showed while the wheel climbed has corrected it, too.
-    pub climbed: bool,
+    /// What the edge showed while the wheel climbed.
+    pub climb: Option<Climb>,
     /// When the corner was first detected.
     pub touched_at: Tick,
     /// Position of the face by the corner that carries, as soon as it shows, mm.
@@ -140,6 +141,19 @@ pub struct LiftPoint {
     pub face: Millimetres,
     /// Found minus table, mm.
     pub residual: Millimetres,
+    /// By how much it seems further out per part of the compression that the sensor misses, mm.
+    pub leverage: Millimetres,
+}
+
+/// An edge under a climbing wheel.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Climb {
+    /// How far outwards it seems to have moved since the lift-off, mm.
+    pub moved: Millimetres,
+    /// As [`LiftPoint::leverage`].
+    pub leverage: Millimetres,
+    /// What shifted the position since then.
+    pub since: [Ratio; 4],
 }
 
 /// Slip of the wheel, as measured.

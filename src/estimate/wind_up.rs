@@ -120,7 +120,7 @@ impl Pulls {
         let pull = Pull {
             traction: both(0),
             normal: both(1),
-            contact: self.contact(pulled, edge, below),
+            contact: self.contact(pulled, edge, (below, presses), rolled > Q16::ZERO),
             rolled: rolled.abs(),
             floor: pulled.floor,
             patch,
@@ -147,20 +147,28 @@ impl Pulls {
         [half, between(pulled.ahead, -half, half)]
     }
 
-    /// Length of the contact, mm: with the wall above an edge, with its face, where a ray of the undeformed
-    /// radius meets it, and with the wall below, which bears this part of the load.
+    /// Length of the contact, mm: with the wall above an edge, and with the wall below, which bears this part
+    /// of the load. On a wall its trailing end lets go early; at an edge that the tread leaves it is cut off.
+    /// The lower wall `presses` that end as by so much compression, the leading one by all of the floor's.
+    /// Inwards it counts with the face, where a ray of the undeformed radius meets that.
     fn contact(
         &self,
         pulled: &Pulled,
         [half, ahead]: [Millimetres; 2],
-        below: Ratio,
+        (below, presses): (Ratio, Millimetres),
+        outwards: bool,
     ) -> Millimetres {
+        let to = |depth: Millimetres| sqrt(depth * (self.radius + self.radius));
+        let bears = |part: Millimetres| if pulled.below { part } else { Q16::ZERO };
+        if outwards {
+            let trails = to(presses.min(pulled.floor)) * (CONTACT + CONTACT - Ratio::ONE);
+            return (half - ahead).min((half + half) * CONTACT) + bears(to(pulled.floor) + trails);
+        }
         let face = divide(ahead.max(Q16::ZERO) * pulled.depth, self.radius - pulled.depth);
         // What an edge has lost is on a wall, wherever its table has that.
         let met = if pulled.lost > Q16::ZERO { pulled.depth * below } else { Q16::ZERO };
-        let wall = sqrt(pulled.floor.max(met) * (self.radius + self.radius));
-        let walls = if pulled.below { wall + wall * below } else { Q16::ZERO };
-        (half - ahead + face + walls) * CONTACT
+        let wall = to(pulled.floor.max(met));
+        (half - ahead + face + bears(wall + wall * below)) * CONTACT
     }
 }
 

@@ -3,7 +3,7 @@
 #![deny(clippy::float_arithmetic)]
 
 use super::{CrossingWatch, HEIGHT_MOST, HOLD, Lift, PER_FALL, WatchInput, WatchState};
-use crate::numeric::sqrt;
+use crate::numeric::{divide, sqrt};
 use crate::units::{Millimetres, Q16, Ratio, Travel, q16};
 
 /// Travel over which ground within [`HOLD`] is a wall, mm. On a corner less than 2.1 mm before its face
@@ -53,6 +53,16 @@ impl CrossingWatch {
             gap: sqrt((reach * reach + chord).max(Q16::ZERO)) - self.radius,
             distance: sqrt((reach * reach - over * over).max(Q16::ZERO)),
         }
+    }
+
+    /// By how much an edge `ahead` seems further out per part of this compression that the sensor misses,
+    /// mm: `c (R - c) / a`.
+    pub(in crate::estimate) fn leverage(
+        &self,
+        depth: Millimetres,
+        ahead: Millimetres,
+    ) -> Millimetres {
+        divide(depth * (self.radius - depth), ahead.max(Millimetres::ONE))
     }
 }
 
