@@ -5,7 +5,7 @@ use super::crossing::{Contact, CrossingEvent, Lift, WatchInput};
 use super::landing::OnEdge;
 use super::odometry::Rolling;
 use super::state::Climb;
-use super::tread::Rolls;
+use super::tread::{Rolls, Shown};
 use super::wind_up::Pulled;
 use super::{EstimateState, Estimator, Expectation, Findings, LiftPoint, OpenCrossing, Position};
 use crate::fault::{Fault, Limit};
@@ -98,10 +98,9 @@ impl Estimator {
             let (duty, pressed) = (tick.duty, tick.pressed);
             let compression = tick.sensed.compression_filtered;
             let rolls = Rolls { direction, travel, speed, duty, pressed, compression };
-            found.shown = self.tread.roll(&mut state.tread, &rolls);
-            if let Some(shown) = found.shown {
-                state.odometry.doubt_tread((shown.rolled - Ratio::ONE).abs());
-            }
+            let shown = self.tread.roll(&mut state.tread, &rolls);
+            let unlike = |shown: &Shown| (shown.rolled - Ratio::ONE).abs();
+            found.shown = shown.inspect(|shown| state.odometry.doubt_tread(unlike(shown)));
         }
         found
     }
@@ -341,7 +340,7 @@ impl Estimator {
             let climbs = lift.filter(|_| state.direction == Direction::Deploy);
             if let Some(lift) = climbs.filter(|_| open.climb.is_none()) {
                 let moved = position + ahead - lift.face;
-                let mut climb = Climb { moved, ..Climb::default() };
+                let mut climb = Climb::default();
                 if open.searched {
                     // The wheel may have begun on this corner, and lifted off elsewhere.
                     state.odometry.set_by_step(sensed.travel, state.position - moved);
@@ -350,8 +349,8 @@ impl Estimator {
                     open.slip.beside += moved;
                     state.odometry.slip(moved, Q16::ZERO);
                 } else {
-                    climb.leverage = self.watch.leverage(seen.compression, ahead);
-                    climb.since = state.odometry.since(state.position);
+                    let leverage = self.watch.leverage(seen.compression, ahead);
+                    climb = Climb { moved, leverage, since: state.odometry.since(state.position) };
                 }
                 open.climb = Some(climb);
                 state.begin_tick(sensed.travel);
