@@ -47,6 +47,8 @@
 #![warn(missing_docs)]
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]
+// The control path is fixed point; where SI numbers come in, they are allowed one by one.
+#![cfg_attr(not(test), deny(clippy::float_arithmetic))]
 // The board's futures run on executors of one core; none has to be `Send`.
 #![allow(async_fn_in_trait)]
 
@@ -59,6 +61,7 @@ pub mod model;
 pub mod numeric;
 pub mod params;
 pub mod restart;
+#[allow(clippy::float_arithmetic, reason = "the rig is written in SI")]
 pub mod rig;
 pub mod sense;
 pub mod supervise;

@@ -2,6 +2,7 @@
 //! every machine. None divides 64-bit numbers, loops without a bound or panics. Floats convert SI
 //! numbers at the start, in `build` alone.
 
+#[allow(clippy::float_arithmetic, reason = "SI to machine units, once at start")]
 mod build;
 mod divide;
 mod high;

@@ -1,7 +1,5 @@
 //! One tick of the controller: the pipeline from sensor codes to bridge commands.
 
-#![deny(clippy::float_arithmetic)]
-
 #[allow(clippy::float_arithmetic, reason = "SI to machine units, once at start")]
 mod build;
 mod drive;
@@ -257,5 +255,4 @@ impl Controller {
 
 #[cfg(test)]
 #[path = "tick/tick_tests.rs"]
-#[allow(clippy::float_arithmetic, reason = "the rig is written in SI")]
 mod tests;

@@ -7,8 +7,6 @@
 //! deviations off it overshoots by less than 2.1 N; the nominal actuator by 0.3 N. Where spring
 //! and ramp together ask for more than the slew, the reference goes only as far as the screw can.
 
-#![deny(clippy::float_arithmetic)]
-
 use heapless::Deque;
 
 use super::schedule::REACHED_PART;
@@ -174,7 +172,6 @@ impl PreloadLoopState {
 }
 
 #[cfg(test)]
-#[allow(clippy::float_arithmetic, reason = "the reference is in f64")]
 mod tests {
     use super::*;
     use proptest::prelude::*;

@@ -1,7 +1,5 @@
 //! From the plan and the distance to the step: speed and preload asked for in this tick.
 
-#![deny(clippy::float_arithmetic)]
-
 use crate::estimate::Steps;
 use crate::model::Plan;
 use crate::model::approach::{Begun, Place};
@@ -223,7 +221,6 @@ impl Schedule {
 }
 
 #[cfg(test)]
-#[allow(clippy::float_arithmetic, reason = "the reference is in f64")]
 mod tests {
     use super::*;
     use crate::model::{Learned, PlanRequest, Planner};

@@ -1,7 +1,5 @@
 //! Speed loop of the drive: feed-forward of speed and load, PI on the rest.
 
-#![deny(clippy::float_arithmetic)]
-
 use crate::numeric::{between, checked};
 use crate::rig::{CROSSOVER_RAD_S, MOST_ERROR_MM_S, PROPORTIONAL, Rig, RigError};
 use crate::units::{Duty, MillimetresPerSecond, Newtons, Q16, Ratio, Travel, per_tick, q16};
@@ -111,7 +109,6 @@ impl SpeedLoopState {
 }
 
 #[cfg(test)]
-#[allow(clippy::float_arithmetic, reason = "the reference is in f64")]
 mod tests {
     use super::*;
     use proptest::prelude::*;

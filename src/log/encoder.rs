@@ -115,7 +115,6 @@ impl LogEncoder {
 }
 
 #[cfg(test)]
-#[allow(clippy::float_arithmetic, reason = "positions of the test")]
 mod tests {
     use super::super::frame::{Body, Frame};
     use super::super::identity;

@@ -1,8 +1,6 @@
 //! Ledger of the crossings: the controller's record of each, and what only the ticks around it
 //! show. The journal keeps it from the records that it encodes, at no cost to the tick.
 
-#![deny(clippy::float_arithmetic)]
-
 use serde::{Deserialize, Serialize};
 
 use super::record::Record;
@@ -90,7 +88,6 @@ impl Ledger {
 }
 
 #[cfg(test)]
-#[allow(clippy::float_arithmetic, reason = "the reference is in f64")]
 pub(super) mod tests {
     use super::*;
     use crate::supervise::Leg;

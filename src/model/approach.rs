@@ -1,8 +1,6 @@
 //! How the wheel comes to a step, and the speed that this asks for on the way: planned by rollouts,
 //! followed by the tick.
 
-#![deny(clippy::float_arithmetic)]
-
 use super::timing::Timing;
 use crate::units::{Millimetres, MillimetresPerSecond, MillimetresPerSecond2, Ratio, Seconds, q16};
 

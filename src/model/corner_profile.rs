@@ -1,8 +1,6 @@
 //! Rise of the wheel over a corner, which compresses the spring, and the drive force that it
 //! takes.
 
-#![deny(clippy::float_arithmetic)]
-
 use crate::numeric::{checked, divide, sqrt};
 use crate::rig::{Rig, RigError};
 use crate::units::{Direction, Millimetres, Q16, Ratio, q16};
@@ -130,7 +128,6 @@ impl CornerProfile {
 }
 
 #[cfg(test)]
-#[allow(clippy::float_arithmetic, reason = "the reference is in f64")]
 mod tests {
     use super::*;
 

@@ -1,7 +1,5 @@
 //! Resonance guard: speeds at which the drive's torque ripple would excite a mode.
 
-#![deny(clippy::float_arithmetic)]
-
 use crate::numeric::checked;
 use crate::rig::{MAX_MODES, Rig, RigError};
 use crate::units::MillimetresPerSecond;
@@ -44,7 +42,6 @@ impl Guard {
 }
 
 #[cfg(test)]
-#[allow(clippy::float_arithmetic, reason = "the reference is in f64")]
 mod tests {
     use super::*;
     use crate::units::Q16;

@@ -1,7 +1,5 @@
 //! How the wheel came to a crossing: what a review rolls the tread through again.
 
-#![deny(clippy::float_arithmetic)]
-
 use crate::numeric::divide;
 use crate::units::{
     Direction, Millimetres, MillimetresPerSecond, Newtons, Q16, Travel, ticks_to_seconds,

@@ -1,8 +1,6 @@
 //! The schedule: the fastest course over the next step that keeps the gap and the friction margin,
 //! by rolling the tread out over it.
 
-#![deny(clippy::float_arithmetic)]
-
 #[allow(clippy::float_arithmetic, reason = "SI to machine units, once at start")]
 mod build;
 mod course;
@@ -427,5 +425,4 @@ fn add(limits: &mut [Option<Limit>; 3], limit: Limit) {
 
 #[cfg(test)]
 #[path = "planner/planner_tests.rs"]
-#[allow(clippy::float_arithmetic, reason = "the gaps are written in mm")]
 mod tests;

@@ -1,7 +1,5 @@
 //! Jerk-limited speed profile.
 
-#![deny(clippy::float_arithmetic)]
-
 use crate::numeric::{between, checked, sqrt};
 use crate::rig::{Rig, RigError};
 use crate::units::{MillimetresPerSecond, MillimetresPerSecond2, Q16, Travel, per_tick};
@@ -92,7 +90,6 @@ impl ProfileState {
 }
 
 #[cfg(test)]
-#[allow(clippy::float_arithmetic, reason = "the reference is in f64")]
 mod tests {
     use super::*;
     use proptest::prelude::*;

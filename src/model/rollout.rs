@@ -1,7 +1,5 @@
 //! One crossing by the rolled-out tread: from where the wheel is to past the lower wall.
 
-#![deny(clippy::float_arithmetic)]
-
 use super::tread::{Axial, Contact, Drive, Tread, TreadState};
 use super::wind_up::Shear;
 use crate::numeric::{between, divide, sqrt};

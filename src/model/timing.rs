@@ -1,7 +1,5 @@
 //! Duration of changes of speed and preload, and the distance rolled meanwhile.
 
-#![deny(clippy::float_arithmetic)]
-
 use crate::numeric::{Divisor, checked, sqrt};
 use crate::rig::{Rig, RigError};
 use crate::units::{
@@ -121,7 +119,6 @@ impl Timing {
 }
 
 #[cfg(test)]
-#[allow(clippy::float_arithmetic, reason = "the reference is in f64")]
 mod tests {
     use super::*;
     use proptest::prelude::*;

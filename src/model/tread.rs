@@ -14,8 +14,6 @@
 //!
 //! Source: Lee and Radok 1960 for the solid; the rolling scheme is this project's own.
 
-#![deny(clippy::float_arithmetic)]
-
 #[allow(clippy::float_arithmetic, reason = "SI to machine units, once at start")]
 mod build;
 mod rays;
@@ -383,5 +381,4 @@ impl Tread {
 }
 
 #[cfg(test)]
-#[allow(clippy::float_arithmetic, reason = "the reference is in f64")]
 mod tests;

@@ -6,8 +6,6 @@
 //! contact: the memory is lost over half its length. Creep is Carter's (1926),
 //! `2 / (1 + sqrt(1 - p))` times the one of little traction, with the part p of friction used.
 
-#![deny(clippy::float_arithmetic)]
-
 use super::tread::Contact;
 use crate::numeric::{between, checked, divide, sqrt};
 use crate::rig::{Rig, RigError};
@@ -195,7 +193,6 @@ impl Spread {
 }
 
 #[cfg(test)]
-#[allow(clippy::float_arithmetic, reason = "the reference is in f64")]
 mod tests {
     use super::*;
 

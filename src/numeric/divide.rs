@@ -1,7 +1,5 @@
 //! Division and reciprocal on the 32-bit divider, and division by a constant.
 
-#![deny(clippy::float_arithmetic)]
-
 use super::high;
 use crate::units::Q16;
 
@@ -119,7 +117,6 @@ pub const fn reciprocal_of_normalised(n: u32) -> u32 {
 }
 
 #[cfg(test)]
-#[allow(clippy::float_arithmetic, reason = "the reference is in f64")]
 mod tests {
     use super::*;
     use crate::numeric::lattice;

@@ -1,8 +1,6 @@
 //! Products and polynomials on the upper half of a 32 x 32 bit product, the one
 //! multiplication of the core that keeps all 32 bits of its operands.
 
-#![deny(clippy::float_arithmetic)]
-
 /// Upper half of a product, `floor(a b / 2^32)`. A factor `t` that represents `t / 2^32` leaves
 /// the format of the other factor as it is.
 #[inline(always)]
@@ -25,7 +23,6 @@ macro_rules! horner {
 pub(crate) use horner;
 
 #[cfg(test)]
-#[allow(clippy::float_arithmetic, reason = "the reference is in f64")]
 mod tests {
     use super::*;
     use proptest::prelude::*;

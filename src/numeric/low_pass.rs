@@ -1,7 +1,5 @@
 //! First-order low-pass at the control rate.
 
-#![deny(clippy::float_arithmetic)]
-
 use crate::units::Q16;
 
 /// First-order low-pass `y += a (x - y)`, one call a tick T, `a = 1 - exp(-T / tau)`: the step
@@ -50,7 +48,6 @@ impl LowPass {
 }
 
 #[cfg(test)]
-#[allow(clippy::float_arithmetic, reason = "the reference is in f64")]
 mod tests {
     use super::*;
     use proptest::prelude::*;

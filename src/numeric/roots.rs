@@ -1,7 +1,5 @@
 //! Square roots without division.
 
-#![deny(clippy::float_arithmetic)]
-
 use super::{high, horner};
 use crate::units::Q16;
 
@@ -59,7 +57,6 @@ const fn upper(a: u32, b: u32) -> u32 {
 }
 
 #[cfg(test)]
-#[allow(clippy::float_arithmetic, reason = "the reference is in f64")]
 mod tests {
     use super::*;
     use crate::numeric::lattice;

@@ -1,7 +1,5 @@
 //! Sine and cosine.
 
-#![deny(clippy::float_arithmetic)]
-
 use super::{high, horner};
 
 /// `sin(pi x / 4) / x` in powers of `x^2 / 4` for x from 0 to 1, Q30: interpolated at the
@@ -32,7 +30,6 @@ pub const fn sin_cos(angle: u32) -> (i32, i32) {
 }
 
 #[cfg(test)]
-#[allow(clippy::float_arithmetic, reason = "the reference is in f64")]
 mod tests {
     use super::*;
     use crate::numeric::lattice;

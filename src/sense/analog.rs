@@ -1,7 +1,5 @@
 //! A linear sensor behind the converter: code to quantity, zero, range, filter.
 
-#![deny(clippy::float_arithmetic)]
-
 use super::freshness::{Filtered, LastGood, Reason};
 use super::raw::{AdcCode, Sample};
 use crate::numeric::LowPass;
@@ -146,7 +144,6 @@ impl AnalogState {
 }
 
 #[cfg(test)]
-#[allow(clippy::float_arithmetic, reason = "the reference is in f64")]
 mod tests {
     use super::super::freshness::Validity;
     use super::*;

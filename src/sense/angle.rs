@@ -1,7 +1,5 @@
 //! The arm's angle from the magnetic encoder's frames.
 
-#![deny(clippy::float_arithmetic)]
-
 use super::freshness::{Filtered, LastGood, Reason};
 use super::raw::{AngleFrame, Sample};
 use crate::numeric::LowPass;
@@ -97,7 +95,6 @@ impl AngleSensor {
 }
 
 #[cfg(test)]
-#[allow(clippy::float_arithmetic, reason = "the reference is in f64")]
 mod tests {
     use super::super::freshness::Validity;
     use super::*;

@@ -1,7 +1,5 @@
 //! Arm geometry: from its angle to the wheel centre and the sleeve level.
 
-#![deny(clippy::float_arithmetic)]
-
 use super::angle::Codes;
 use crate::numeric::{between, checked, reciprocal_of_normalised, sin_cos};
 use crate::rig::{MAX_STEPS, Rig, RigError};
@@ -83,7 +81,6 @@ impl Arm {
 }
 
 #[cfg(test)]
-#[allow(clippy::float_arithmetic, reason = "the reference is in f64")]
 mod tests {
     use super::*;
     use proptest::prelude::*;

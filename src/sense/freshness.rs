@@ -1,7 +1,5 @@
 //! A reading: when it was taken, whether its sensor still answers, and its low-pass.
 
-#![deny(clippy::float_arithmetic)]
-
 use super::raw::Sample;
 use crate::numeric::{LowPass, LowPassState};
 use crate::units::{Q16, Tick};

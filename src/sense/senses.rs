@@ -1,7 +1,5 @@
 //! All four sensors of one tick.
 
-#![deny(clippy::float_arithmetic)]
-
 use super::analog::{AnalogChannel, AnalogState, Zeroing};
 use super::angle::AngleSensor;
 use super::arm::Arm;
@@ -211,7 +209,6 @@ impl SensesState {
 }
 
 #[cfg(test)]
-#[allow(clippy::float_arithmetic, reason = "the reference is in f64")]
 mod tests {
     use super::*;
 

@@ -1,7 +1,5 @@
 //! Travel and speed from the wheel encoder.
 
-#![deny(clippy::float_arithmetic)]
-
 use super::freshness::{Freshness, Reading, Reason, age};
 use super::raw::{EncoderCount, Sample};
 use crate::numeric::checked;
@@ -172,7 +170,6 @@ fn speed_mm_s(speed: i64) -> MillimetresPerSecond {
 }
 
 #[cfg(test)]
-#[allow(clippy::float_arithmetic, reason = "the reference is in f64")]
 mod tests {
     use super::super::freshness::Validity;
     use super::*;

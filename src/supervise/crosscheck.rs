@@ -2,8 +2,6 @@
 //! quantities that no single fault changes alike. They run while the drive is on and start again
 //! when it has been off.
 
-#![deny(clippy::float_arithmetic)]
-
 use super::Observed;
 use crate::fault::Fault;
 use crate::numeric::checked;
@@ -361,5 +359,4 @@ impl CrossState {
 
 #[cfg(test)]
 #[path = "crosscheck_tests.rs"]
-#[allow(clippy::float_arithmetic, reason = "the reference is in f64")]
 mod tests;

@@ -1,7 +1,5 @@
 //! Watches the tick's quantities for faults.
 
-#![deny(clippy::float_arithmetic)]
-
 use super::Mode;
 use super::crosscheck::{CrossCheck, CrossState, Noise, lasts};
 use super::readback::{Readback, ReadbackState};
@@ -207,6 +205,5 @@ pub(super) fn sensor_fault(sensed: &SensedState, ranged: bool) -> Option<Fault> 
 }
 
 #[cfg(test)]
-#[allow(clippy::float_arithmetic, reason = "the reference is in f64")]
 #[path = "monitor_tests.rs"]
 mod tests;

@@ -6,8 +6,6 @@
 //! negative ones. A bound that rises with the shortest lag and falls with the longest one holds
 //! for every lag between them.
 
-#![deny(clippy::float_arithmetic)]
-
 use crate::numeric::{LowPass, LowPassState};
 use crate::units::{Q16, Ratio};
 
@@ -55,7 +53,6 @@ impl Turning {
 }
 
 #[cfg(test)]
-#[allow(clippy::float_arithmetic, reason = "the reference is in f64")]
 mod tests {
     use super::*;
     use proptest::prelude::*;

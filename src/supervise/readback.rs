@@ -10,8 +10,6 @@
 //! Faults behind the output (a motor without force, a slipping gear, a jammed screw) are left to
 //! the comparison of the sensors in `crosscheck`.
 
-#![deny(clippy::float_arithmetic)]
-
 use super::motor::{Motor, Turning};
 use crate::fault::Fault;
 use crate::rig::Rig;
@@ -198,6 +196,5 @@ impl Bridge {
 }
 
 #[cfg(test)]
-#[allow(clippy::float_arithmetic, reason = "the reference is in f64")]
 #[path = "readback_tests.rs"]
 mod tests;

@@ -6,8 +6,6 @@
 //! was entered by [`PRELOAD`] or [`COMPRESSION`]. Then both bridges stay at rest until the host
 //! has asked for rest.
 
-#![deny(clippy::float_arithmetic)]
-
 use serde::{Deserialize, Serialize};
 
 use crate::fault::Limit;
@@ -156,7 +154,6 @@ impl ServiceState {
 }
 
 #[cfg(test)]
-#[allow(clippy::float_arithmetic, reason = "quantities of a test")]
 mod tests {
     use super::*;
     use proptest::prelude::*;

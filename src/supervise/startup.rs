@@ -1,7 +1,5 @@
 //! Conditions of boot, self-test and zero.
 
-#![deny(clippy::float_arithmetic)]
-
 use super::monitor::sensor_fault;
 use crate::fault::Fault;
 use crate::sense::SensedState;
@@ -44,7 +42,6 @@ pub fn stowed(sensed: &SensedState, pressed: Newtons, zero_limit: Newtons, known
 }
 
 #[cfg(test)]
-#[allow(clippy::float_arithmetic, reason = "quantities of a test")]
 mod tests {
     use super::*;
     use crate::sense::{Reason, Validity};

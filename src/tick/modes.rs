@@ -154,7 +154,6 @@ impl Controller {
 }
 
 #[cfg(test)]
-#[allow(clippy::float_arithmetic, reason = "quantities of a test")]
 mod tests {
     use super::super::tests::{answering, within};
     use super::*;

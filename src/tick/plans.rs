@@ -161,7 +161,6 @@ fn lead_time(open: &OpenCrossing, lifted_at: Tick) -> Seconds {
 }
 
 #[cfg(test)]
-#[allow(clippy::float_arithmetic, reason = "quantities of a test")]
 mod tests {
     use super::super::tests::{sensed, within};
     use super::*;

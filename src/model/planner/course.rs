@@ -1,8 +1,6 @@
 //! One crossing of a plan, rolled out: the wheel follows the plan's approach as the tick does, and
 //! the tread says what comes of it.
 
-#![deny(clippy::float_arithmetic)]
-
 use super::Planner;
 use crate::model::approach::{Approach, Begun, Place};
 use crate::model::plan::PLAN_TICKS;

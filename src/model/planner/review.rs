@@ -1,8 +1,6 @@
 //! A crossing as it was measured against the tread rolled through the same history, and what is
 //! learned from it.
 
-#![deny(clippy::float_arithmetic)]
-
 use super::course::STRIDES_AT_ONCE;
 use super::{Planner, WIDE};
 use crate::model::history::{HistoryStride, STRIDES};

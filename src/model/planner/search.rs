@@ -5,8 +5,6 @@
 //! slowest speed and the place of the release. For each window and release the slowest speed follows
 //! from the gap; of those pairs the one is taken whose course takes least time.
 
-#![deny(clippy::float_arithmetic)]
-
 use super::Planner;
 use super::course::{Course, RolledOut, Scene};
 use crate::model::approach::Approach;

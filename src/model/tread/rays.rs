@@ -56,7 +56,6 @@ const fn at(place: i64) -> Ray {
 }
 
 #[cfg(test)]
-#[allow(clippy::float_arithmetic, reason = "the reference is in f64")]
 mod tests {
     use super::*;
 

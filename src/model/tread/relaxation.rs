@@ -100,7 +100,6 @@ fn mean_decay(ratio: i32, keeps: i32) -> i32 {
 }
 
 #[cfg(test)]
-#[allow(clippy::float_arithmetic, reason = "the reference is in f64")]
 mod tests {
     use super::*;
     use proptest::prelude::*;
