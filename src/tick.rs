@@ -108,7 +108,7 @@ pub struct Controller {
 }
 
 /// Data of a tick that the stages share.
-struct TickContext<'a> {
+struct Context<'a> {
     now: Tick,
     sensed: &'a SensedState,
     /// Radial force that the arm's inclination adds to the preload, N.
@@ -118,7 +118,7 @@ struct TickContext<'a> {
     output: &'a mut Output,
 }
 
-impl TickContext<'_> {
+impl Context<'_> {
     fn log(&mut self, event: Event) {
         // A tick with more events than fit reports the first eight.
         let _ = self.output.events.push(Entry { at: self.now, event });
@@ -170,7 +170,7 @@ impl Controller {
         self.estimator.begin_tick(&mut state.estimate, &sensed);
         let arm_thrust = self.arm_coupling * self.load_of(state) * sensed.tan_arm;
         let tick =
-            &mut TickContext { now: input.now, sensed: &sensed, arm_thrust, trigger: None, output };
+            &mut Context { now: input.now, sensed: &sensed, arm_thrust, trigger: None, output };
         self.take_plan(state, tick, input.plan.as_ref());
         self.transit(state, tick);
         self.look_for_faults(state, tick, input);
@@ -191,7 +191,7 @@ impl Controller {
         tick.output.telemetry = self.telemetry(state, tick, &targets);
     }
 
-    fn look_for_faults(&self, state: &mut State, tick: &mut TickContext<'_>, input: &Input) {
+    fn look_for_faults(&self, state: &mut State, tick: &mut Context<'_>, input: &Input) {
         let steady = state.profile.acceleration() == Q16::ZERO && !state.estimate.on_corner();
         let observed = Observed {
             now: tick.now,
@@ -211,12 +211,7 @@ impl Controller {
         }
     }
 
-    fn take_command(
-        &self,
-        state: &mut State,
-        tick: &mut TickContext<'_>,
-        command: Option<Command>,
-    ) {
+    fn take_command(&self, state: &mut State, tick: &mut Context<'_>, command: Option<Command>) {
         let Some(command) = command else { return };
         // A reset sent before the fault must not clear it unseen.
         let hasty = matches!(state.mode, Mode::FaultHold(_)) && state.in_mode < HOLD_TICKS;
@@ -231,7 +226,7 @@ impl Controller {
     }
 
     /// Follows steps and corners while the drive moves, and an axle that sinks on its tread.
-    fn follow_contact(&self, state: &mut State, tick: &mut TickContext<'_>) {
+    fn follow_contact(&self, state: &mut State, tick: &mut Context<'_>) {
         let plan = state.planning.plan.as_ref();
         let most = plan.map_or(Q16::MAX, |plan| plan.most_preload);
         let follow = Follow {
