@@ -137,9 +137,8 @@ mod firmware {
     tasks! {
         clock() => tasks::clock(&EXCHANGE);
         wheel_encoder(wheel: Wheel) => tasks::wheel_encoder(wheel, &EXCHANGE);
-        analog[SensorId::ANALOG.len()](sensor: SensorId, input: Analog) => {
-            tasks::analog(sensor, input, &EXCHANGE)
-        };
+        analog[SensorId::ANALOG.len()](sensor: SensorId, input: Analog) =>
+            tasks::analog(sensor, input, &EXCHANGE);
         arm_angle(bus: Angle) => tasks::arm_angle(bus, &EXCHANGE);
         motors(
             motors: Bridges, watchdog: Guard, controller: &'static Controller,
@@ -149,11 +148,8 @@ mod firmware {
         model(planner: &'static Planner) => tasks::model(planner, &EXCHANGE, board::paused);
         pressed(button: Button) => tasks::operator(button, &EXCHANGE);
         typed(console: Console) => tasks::operator(console, &EXCHANGE);
-        link(line: HostLine, service: Service<ParameterFlash>) => {
-            tasks::link(line, service, &EXCHANGE)
-        };
-        journal(log: TextLog, lamp: Lamp) => {
-            tasks::journal(log, lamp, ENCODER.take(), &EXCHANGE)
-        };
+        link(line: HostLine, service: Service<ParameterFlash>) =>
+            tasks::link(line, service, &EXCHANGE);
+        journal(log: TextLog, lamp: Lamp) => tasks::journal(log, lamp, ENCODER.take(), &EXCHANGE);
     }
 }

@@ -107,8 +107,8 @@ pub struct Controller {
     rolling_preload: Newtons,
 }
 
-/// Data of a tick that the stages share.
-struct Context<'a> {
+/// A pass of a tick through its stages: the data that they share.
+struct Pass<'a> {
     now: Tick,
     sensed: &'a SensedState,
     /// Radial force that the arm's inclination adds to the preload, N.
@@ -118,7 +118,7 @@ struct Context<'a> {
     output: &'a mut Output,
 }
 
-impl Context<'_> {
+impl Pass<'_> {
     fn log(&mut self, event: Event) {
         // A tick with more events than fit reports the first eight.
         let _ = self.output.events.push(Entry { at: self.now, event });
@@ -163,14 +163,12 @@ impl Controller {
         output.request = None;
         output.rearm = false;
         output.events.clear();
-        let acceleration = state.outwards(state.profile.acceleration());
-        let mut sensed =
-            self.senses.step(&mut state.senses, input.now, &input.sensors, acceleration);
+        let outwards = state.outwards(state.profile.acceleration());
+        let mut sensed = self.senses.step(&mut state.senses, input.now, &input.sensors, outwards);
         state.estimate.rim(&mut sensed, matches!(state.mode, Mode::Run(..)));
         self.estimator.begin_tick(&mut state.estimate, &sensed);
         let arm_thrust = self.arm_coupling * self.load_of(state) * sensed.tan_arm;
-        let tick =
-            &mut Context { now: input.now, sensed: &sensed, arm_thrust, trigger: None, output };
+        let tick = &mut Pass { now: input.now, sensed: &sensed, arm_thrust, trigger: None, output };
         self.take_plan(state, tick, input.plan.as_ref());
         self.transit(state, tick);
         self.look_for_faults(state, tick, input);
@@ -191,7 +189,7 @@ impl Controller {
         tick.output.telemetry = self.telemetry(state, tick, &targets);
     }
 
-    fn look_for_faults(&self, state: &mut State, tick: &mut Context<'_>, input: &Input) {
+    fn look_for_faults(&self, state: &mut State, tick: &mut Pass<'_>, input: &Input) {
         let steady = state.profile.acceleration() == Q16::ZERO && !state.estimate.on_corner();
         let observed = Observed {
             now: tick.now,
@@ -211,7 +209,7 @@ impl Controller {
         }
     }
 
-    fn take_command(&self, state: &mut State, tick: &mut Context<'_>, command: Option<Command>) {
+    fn take_command(&self, state: &mut State, tick: &mut Pass<'_>, command: Option<Command>) {
         let Some(command) = command else { return };
         // A reset sent before the fault must not clear it unseen.
         let hasty = matches!(state.mode, Mode::FaultHold(_)) && state.in_mode < HOLD_TICKS;
@@ -226,7 +224,7 @@ impl Controller {
     }
 
     /// Follows steps and corners while the drive moves, and an axle that sinks on its tread.
-    fn follow_contact(&self, state: &mut State, tick: &mut Context<'_>) {
+    fn follow_contact(&self, state: &mut State, tick: &mut Pass<'_>) {
         let plan = state.planning.plan.as_ref();
         let most = plan.map_or(Q16::MAX, |plan| plan.most_preload);
         let follow = Follow {

@@ -155,27 +155,21 @@ impl Schedule {
         if held <= Q16::ZERO {
             Q16::MAX
         } else if release > Q16::ZERO {
-            self.arriving_in(held, release, course)
+            self.in_time(held, release, course)
         } else {
-            self.arriving_in(needed, distance - plan.approach.lift, course)
+            self.in_time(needed, distance - plan.approach.lift, course)
         }
     }
 
-    /// Speed at which what is `ahead` takes this time, mm/s, braking to it included.
-    fn arriving_in(
-        &self,
-        needed: Seconds,
-        ahead: Millimetres,
-        course: &Course,
-    ) -> MillimetresPerSecond {
-        let mean = divide(ahead.max(Q16::ZERO), needed);
+    /// Speed at which what is `ahead` takes this `time`, mm/s, braking to it included.
+    fn in_time(&self, time: Seconds, ahead: Millimetres, course: &Course) -> MillimetresPerSecond {
+        let mean = divide(ahead.max(Q16::ZERO), time);
         let braking = self.timing.speed_change((course.speed - mean).max(Q16::ZERO));
-        if braking >= needed {
+        if braking >= time {
             return mean;
         }
-        let braked =
-            if course.speed > mean { self.brake_distance(course, mean) } else { Q16::ZERO };
-        divide((ahead - braked).max(Q16::ZERO), needed - braking)
+        let slows = if course.speed > mean { self.brake_distance(course, mean) } else { Q16::ZERO };
+        divide((ahead - slows).max(Q16::ZERO), time - braking)
     }
 
     /// Distance before the earliest place where the preload must be reached at which a preload now
@@ -205,14 +199,9 @@ impl Schedule {
     }
 
     /// Speed towards the end of travel, mm/s: free until braking to rest must begin.
-    fn end_speed(
-        &self,
-        steps: &Steps,
-        course: &Course,
-        sight: Millimetres,
-    ) -> MillimetresPerSecond {
+    fn end_speed(&self, steps: &Steps, course: &Course, seen: Millimetres) -> MillimetresPerSecond {
         let due = || course.remaining <= self.brake_distance(course, Q16::ZERO) - END_LATE;
-        if steps.arrived(course.remaining) || course.remaining <= sight && due() {
+        if steps.arrived(course.remaining) || course.remaining <= seen && due() {
             Q16::ZERO
         } else {
             Q16::MAX

@@ -87,26 +87,16 @@ impl DeltaRecord {
     pub(super) fn record(&self) -> Option<Record> {
         let (ages, quantities) = self.numbers[1..].split_at(AGES);
         let (sensors, &[bridges, duties, state, flags]) = self.words.split_last_chunk()?;
-        let mut ages: [u8; SensorId::COUNT] =
-            filled(ages.iter().flat_map(|ages| ages.to_le_bytes()));
+        let mut ages: [u8; SensorId::COUNT] = filled(ages.iter().flat_map(|age| age.to_le_bytes()));
         ages.rotate_left(1);
         let [level, stage, mode, rest] = state.to_le_bytes();
         let [drive, pretightener] = halves(duties).map(|half| Duty::from_bits(half as i16));
-        let (mode, stage) = (codes::mode(mode)?, codes::stage(stage)?);
+        let (at, mode, stage) = (self.at(), codes::mode(mode)?, codes::stage(stage)?);
         (rest == 0).then_some(())?;
-        let state = Telemetry {
-            at: self.at(),
-            mode,
-            stage,
-            level,
-            drive,
-            pretightener,
-            ..Telemetry::default()
-        };
+        let t = Telemetry { at, mode, stage, level, drive, pretightener, ..Telemetry::default() };
+        let quantities = filled(quantities.iter().map(|bits| Q16::from_bits(*bits as i32)));
         Some(Record {
-            telemetry: state.with_quantities(filled(
-                quantities.iter().map(|bits| Q16::from_bits(*bits as i32)),
-            )),
+            telemetry: t.with_quantities(quantities),
             codes: filled(sensors.iter().flat_map(|word| halves(*word))),
             ages,
             bridges: halves(bridges),

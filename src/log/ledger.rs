@@ -69,18 +69,16 @@ impl Ledger {
     /// Closes the line of a crossing.
     pub fn close(&mut self, at: Tick, crossing: &CrossingRecord) -> Line {
         self.count = self.count.saturating_add(1);
-        let scale = crossing.stiffness_scale;
+        let (scale, residual) = (crossing.stiffness_scale, crossing.residual);
         if let Some(before) = self.scale.replace(scale) {
             self.trend += NEWEST * (scale - before - self.trend);
         }
-        let ahead =
-            if crossing.direction.sign() > 0 { crossing.residual } else { -crossing.residual };
         Line {
             at,
             count: self.count,
             crossing: *crossing,
             speed_dip: self.dip,
-            slip: ahead,
+            slip: if crossing.direction.sign() > 0 { residual } else { -residual },
             gap_residual: crossing.gap_measured - crossing.gap_predicted,
             trend: self.trend,
         }

@@ -93,22 +93,16 @@ impl History {
 
 impl HistoryWriter {
     /// One tick at this travel of the tread, mm outwards, under this force, N.
-    pub fn step(
-        &mut self,
-        stride: Millimetres,
-        direction: Direction,
-        travel: Travel,
-        pressed: Newtons,
-    ) {
+    pub fn step(&mut self, stride: Millimetres, way: Direction, travel: Travel, pressed: Newtons) {
         let from = *self.from.get_or_insert(travel);
         self.ticks = self.ticks.saturating_add(1);
-        if direction != self.direction || self.ticks > STANDS {
-            *self = Self { direction, from: Some(travel), ..Self::default() };
+        if way != self.direction || self.ticks > STANDS {
+            *self = Self { direction: way, from: Some(travel), ..Self::default() };
             return;
         }
-        let stride = if direction == Direction::Deploy { stride } else { -stride };
+        let stride = if way == Direction::Deploy { stride } else { -stride };
         let end = from.saturating_add(stride.widen());
-        if (direction == Direction::Deploy) == (travel >= end) && travel != from {
+        if (way == Direction::Deploy) == (travel >= end) && travel != from {
             self.history.push(HistoryStride::new(self.ticks, pressed));
             (self.from, self.ticks) = (Some(end), 0);
         }

@@ -344,11 +344,10 @@ impl Planner {
 
     /// Distance and time of braking before the step.
     fn braking(&self, plan: &mut Plan) {
-        plan.brake_horizon =
-            self.timing.longest_brake_distance(plan.cruise_speed.max(plan.cross_speed));
-        plan.brake_distance =
-            self.timing.brake_distance(plan.cruise_speed, plan.approach.slowest_speed);
-        plan.brake_time = self.timing.speed_change(plan.cruise_speed - plan.approach.slowest_speed);
+        let (cruise, slowest) = (plan.cruise_speed, plan.approach.slowest_speed);
+        plan.brake_horizon = self.timing.longest_brake_distance(cruise.max(plan.cross_speed));
+        plan.brake_distance = self.timing.brake_distance(cruise, slowest);
+        plan.brake_time = self.timing.speed_change(cruise - slowest);
     }
 
     /// Friction as far as known, and the part of it that may be used. What has gripped may be used

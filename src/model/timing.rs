@@ -34,7 +34,8 @@ impl Timing {
         // After the end of a ramp the force lags by slew x lag, which two more lags bring to a
         // few tenths of a newton; the reserve covers times that are half as long again.
         let rate_part = SLEW_PART.to_num::<f64>();
-        let times = rig.preload.delay_s + 2.0 * rig.preload.lag_s;
+        let (delay, lag) = (rig.preload.delay_s, rig.preload.lag_s);
+        let latency = delay + 2.0 * lag + 0.5 * (delay + lag);
         Ok(Self {
             acceleration: checked("drive.acceleration_mm_s2", a)?,
             by_acceleration: Divisor::build("drive.acceleration_mm_s2", a)?,
@@ -42,10 +43,7 @@ impl Timing {
             by_rate: Divisor::build("preload.slew_n_per_s", rig.preload.slew_n_per_s * rate_part)?,
             build_up: checked("drive.jerk_mm_s3", a / j)?,
             knee: checked("drive.jerk_mm_s3", (a * a / j).min(30_000.0))?,
-            latency: checked(
-                "preload.delay_s",
-                times + 0.5 * (rig.preload.delay_s + rig.preload.lag_s),
-            )?,
+            latency: checked("preload.delay_s", latency)?,
         })
     }
 

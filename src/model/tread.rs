@@ -219,9 +219,8 @@ impl Tread {
         let slope = divide(Q16::from_bits(state.frame.climb >> 6), self.stride);
         let level = sqrt((Q16::ONE - slope * slope).max(Q16::ZERO));
         let wall = if state.frame.position >= 0 { self.height } else { 0 };
-        let compression =
-            Q16::from_bits((self.radius + wall - state.frame.centre) >> 6).max(Q16::ZERO);
-        let rolls = Q16::ONE - compression * self.rolling_lag;
+        let pressed = Q16::from_bits((self.radius + wall - state.frame.centre) >> 6).max(Q16::ZERO);
+        let rolls = Q16::ONE - pressed * self.rolling_lag;
         // Q16 x Q16 to Q22, kept to the last bit.
         let part = level * rolls;
         ((i64::from(part.to_bits()) * i64::from(rolled.to_bits())) >> 10) as i32

@@ -48,9 +48,8 @@ impl LowPass {
     /// A low-pass of time constant `tau_s`, s; none at all if it is not positive.
     /// Longest useful: 20 s, where the gain is three LSB.
     pub fn build(tau_s: f64) -> Self {
-        let gain =
-            if tau_s > 0.0 { -libm::expm1(-1.0 / (f64::from(TICK_HZ) * tau_s)) } else { 1.0 };
-        Self { gain: libm::round(gain * 65_536.0).clamp(1.0, 65_536.0) as u32 }
+        let a = if tau_s > 0.0 { -libm::expm1(-1.0 / (f64::from(TICK_HZ) * tau_s)) } else { 1.0 };
+        Self { gain: libm::round(a * 65_536.0).clamp(1.0, 65_536.0) as u32 }
     }
 }
 

@@ -235,11 +235,7 @@ impl Draft {
     ///
     /// # Errors
     /// [`Refusal`]; the set in force stays.
-    pub async fn append(
-        &mut self,
-        memory: &mut impl SetMemory,
-        piece: &[u8],
-    ) -> Result<(), Refusal> {
+    pub async fn append(&mut self, to: &mut impl SetMemory, piece: &[u8]) -> Result<(), Refusal> {
         if piece.len() > self.missing() {
             return Err(Refusal::Length);
         }
@@ -249,7 +245,7 @@ impl Draft {
         for part in piece.chunks(WORD_BYTES) {
             let mut word = [0xFF; WORD_BYTES];
             word.iter_mut().zip(part).for_each(|(to, from)| *to = *from);
-            memory.program(self.slot, PREFIX + self.written, word).await?;
+            to.program(self.slot, PREFIX + self.written, word).await?;
             self.written += part.len();
         }
         Ok(())

@@ -54,10 +54,8 @@ impl PackedZeros {
     /// The zeros.
     pub fn zeros(self) -> Zeros {
         let unpack = |bits: i16, cut: u32| Q16::from_bits(i32::from(bits) << cut);
-        Zeros {
-            preload: unpack(self.0, Self::COARSER.0),
-            compression: unpack(self.1, Self::COARSER.1),
-        }
+        let (force, depth) = Self::COARSER;
+        Zeros { preload: unpack(self.0, force), compression: unpack(self.1, depth) }
     }
 }
 

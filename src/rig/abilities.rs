@@ -1,6 +1,7 @@
 //! What sensors, pre-tightener and drive of a rig can do.
 
-use super::{Bound, Rig, RigError};
+use super::Bound::{AtLeast, AtMost};
+use super::{Rig, RigError};
 use crate::sense::analog::{BROKEN_ABOVE, FULL_AT, ZERO_AT};
 
 /// Crossover of the speed loop's integral part, rad/s: a third of the speed observer's bandwidth.
@@ -46,7 +47,7 @@ pub(crate) const START_LAG_MM: f64 = 2.0;
 impl Rig {
     /// Whether sensors, pre-tightener and drive can do what the controller asks of them.
     pub(super) fn abilities(&self) -> Result<(), RigError> {
-        let (preload, drive) = (&self.preload, &self.drive);
+        let (preload, drive, spring) = (&self.preload, &self.drive, self.preload.spring_n_per_mm);
         let turn_mm = 2.0 * core::f64::consts::PI * self.rig.wheel_radius_mm;
         // A corner pressed by the limit into a relaxed tread: a triangle on each side of it, at the
         // slope of a wheel that touches it, carries `k L d^2 / tan(phi)`.
@@ -54,51 +55,45 @@ impl Rig {
         let rate = 1e-9 * self.tread.k_inf_pa_per_m * self.rig.wheel_width_mm;
         let deepest = libm::sqrt(preload.limit_n * slope / rate);
         let load = self.plant.top_load_n * self.plant.top_load_share;
-        let accelerated = load
-            + 1e-3
-                * (drive.reflected_mass_kg + self.plant.moved_mass_kg)
-                * drive.acceleration_mm_s2;
+        let moved_kg = drive.reflected_mass_kg + self.plant.moved_mass_kg;
+        let accelerated = load + 1e-3 * moved_kg * drive.acceleration_mm_s2;
         let climbs = load + preload.limit_n * slope;
         // What the proportional part adds, whatever the load.
-        let corrected =
-            drive.stall_force_n * PROPORTIONAL * MOST_ERROR_MM_S / drive.no_load_speed_mm_s;
+        let adds = drive.stall_force_n * PROPORTIONAL * MOST_ERROR_MM_S / drive.no_load_speed_mm_s;
         let checks: [(_, _, &[&'static str], _); 9] = [
             (
                 self.sense.encoder_counts,
-                Bound::AtLeast(turn_mm / LARGEST_COUNT_MM),
+                AtLeast(turn_mm / LARGEST_COUNT_MM),
                 &["sense.encoder_counts", "rig.wheel_radius_mm"],
                 "a count is too long for the speed of a crossing",
             ),
             (
                 self.sense.preload_full_scale_n,
-                Bound::AtLeast(preload.limit_n * (1.0 + OVERPRESSURE_PART) / SHOWN_PART),
+                AtLeast(preload.limit_n * (1.0 + OVERPRESSURE_PART) / SHOWN_PART),
                 &["sense.preload_full_scale_n", "preload.limit_n"],
                 "the sensor does not show a preload beyond preload.limit_n",
             ),
             (
                 self.sense.tread_full_scale_mm,
-                Bound::AtLeast(deepest / SHOWN_PART),
+                AtLeast(deepest / SHOWN_PART),
                 &["sense.tread_full_scale_mm", "preload.limit_n", "tread.k_inf_pa_per_m"],
                 "the sensor does not show how deep preload.limit_n presses a corner into the tread",
             ),
             (
                 preload.slew_n_per_s,
-                Bound::AtMost(preload.cruise_n / self.preload_latency_s()),
+                AtMost(preload.cruise_n / self.preload_latency_s()),
                 &["preload.slew_n_per_s", "preload.cruise_n", "preload.delay_s", "preload.lag_s"],
                 "preload.delay_s and preload.lag_s allow more than preload.cruise_n before it answers",
             ),
             (
-                preload.spring_n_per_mm,
-                Bound::AtMost(self.regulation_n() / (LIFT_SLOPE * self.rig.step_tolerance_mm)),
+                spring,
+                AtMost(self.regulation_n() / (LIFT_SLOPE * self.rig.step_tolerance_mm)),
                 &["preload.spring_n_per_mm", "preload.limit_n", "rig.step_tolerance_mm"],
                 "a step that is off by rig.step_tolerance_mm changes the preload beyond regulation",
             ),
             (
-                preload.spring_n_per_mm,
-                Bound::AtMost(
-                    preload.spring_n_per_mm * self.climb_speed_mm_s()
-                        / self.least_planned_speed_mm_s(),
-                ),
+                spring,
+                AtMost(spring * self.climb_speed_mm_s() / self.least_planned_speed_mm_s()),
                 &[
                     "preload.spring_n_per_mm",
                     "preload.slew_n_per_s",
@@ -111,7 +106,7 @@ impl Rig {
             ),
             (
                 drive.force_limit_n,
-                Bound::AtLeast(accelerated.max(climbs) + corrected),
+                AtLeast(accelerated.max(climbs) + adds),
                 &[
                     "drive.force_limit_n",
                     "drive.stall_force_n",
@@ -126,9 +121,7 @@ impl Rig {
             ),
             (
                 drive.stall_force_n,
-                Bound::AtLeast(
-                    accelerated / (1.0 - drive.cruise_speed_mm_s / drive.no_load_speed_mm_s),
-                ),
+                AtLeast(accelerated / (1.0 - drive.cruise_speed_mm_s / drive.no_load_speed_mm_s)),
                 &[
                     "drive.stall_force_n",
                     "drive.no_load_speed_mm_s",
@@ -140,9 +133,7 @@ impl Rig {
             ),
             (
                 drive.stall_force_n,
-                Bound::AtLeast(
-                    climbs * drive.no_load_speed_mm_s / (CROSSOVER_RAD_S * START_LAG_MM),
-                ),
+                AtLeast(climbs * drive.no_load_speed_mm_s / (CROSSOVER_RAD_S * START_LAG_MM)),
                 &[
                     "drive.stall_force_n",
                     "drive.no_load_speed_mm_s",
@@ -155,8 +146,8 @@ impl Rig {
         ];
         for (value, bound, keys, reason) in checks {
             let kept = match bound {
-                Bound::AtLeast(least) => value >= least,
-                Bound::AtMost(most) => value <= most,
+                AtLeast(least) => value >= least,
+                AtMost(most) => value <= most,
             };
             if !kept {
                 return Err(RigError::Unable { value, bound, reason, keys });

@@ -189,9 +189,8 @@ impl Rig {
 
     /// Axial distance of a corner from the centre at which the undeformed wheel touches it, mm.
     pub fn corner_reach_mm(&self) -> f64 {
-        let (radius, above) =
-            (self.rig.wheel_radius_mm, self.rig.wheel_radius_mm - self.rig.step_height_mm);
-        libm::sqrt(radius * radius - above * above)
+        let (radius, height) = (self.rig.wheel_radius_mm, self.rig.step_height_mm);
+        libm::sqrt(radius * radius - (radius - height) * (radius - height))
     }
 
     /// Preload with which the wheel may roll along the wall, N: its tread carries load and

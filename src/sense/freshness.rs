@@ -142,15 +142,9 @@ impl LastGood {
 
     /// One tick of the filter, on the held value whatever the jitter of the samples; both outputs
     /// less `offset`. `limit` is the largest age, ticks.
-    pub(super) fn step(
-        &mut self,
-        low_pass: &LowPass,
-        offset: Q16,
-        now: Tick,
-        limit: u32,
-    ) -> Filtered {
+    pub(super) fn step(&mut self, pass: &LowPass, offset: Q16, now: Tick, limit: u32) -> Filtered {
         let filtered = match &mut self.filter {
-            Some(filter) => low_pass.step(filter, self.value),
+            Some(filter) => pass.step(filter, self.value),
             none => {
                 *none = self.freshness.good.map(|_| LowPassState::at(self.value));
                 self.value

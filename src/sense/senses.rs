@@ -77,23 +77,15 @@ impl Senses {
     /// The sensors of `rig` with a speed observer of this bandwidth, rad/s, and a low-pass of this
     /// time constant, s, for the others.
     #[allow(clippy::float_arithmetic, reason = "SI to machine units, once at start")]
-    pub fn try_build_with(
-        rig: &Rig,
-        bandwidth_rad_s: f64,
-        filter_s: f64,
-    ) -> Result<Self, RigError> {
+    pub fn try_build_with(rig: &Rig, observer_rad_s: f64, filter_s: f64) -> Result<Self, RigError> {
         let arm = Arm::try_build(rig)?;
+        let channel = |key, full_scale| AnalogChannel::try_build(key, full_scale, filter_s);
         Ok(Self {
-            wheel_encoder: Speedometer::try_build(rig, bandwidth_rad_s)?,
-            preload_sensor: AnalogChannel::try_build(
-                "sense.preload_full_scale_n",
-                rig.sense.preload_full_scale_n,
-                filter_s,
-            )?,
-            compression_sensor: AnalogChannel::try_build(
+            wheel_encoder: Speedometer::try_build(rig, observer_rad_s)?,
+            preload_sensor: channel("sense.preload_full_scale_n", rig.sense.preload_full_scale_n)?,
+            compression_sensor: channel(
                 "sense.tread_full_scale_mm",
                 rig.sense.tread_full_scale_mm,
-                filter_s,
             )?,
             arm_angle: AngleSensor::build(rig.sense.angle_zero_code, arm.reach, filter_s),
             arm,

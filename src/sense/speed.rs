@@ -116,8 +116,7 @@ impl Speedometer {
     ) {
         let Some((before, newest)) = state.freshness.good.zip(newest) else {
             state.count = sample.code;
-            state.error = 0;
-            state.speed = 0;
+            (state.error, state.speed) = (0, 0);
             state.freshness.judge(Ok(()));
             return;
         };
@@ -134,8 +133,7 @@ impl Speedometer {
         state.travel = state.travel.saturating_add(Travel::from_bits(moved));
         if gap > limit {
             // Too long without a correction: start again.
-            state.error = 0;
-            state.speed = 0;
+            (state.error, state.speed) = (0, 0);
             return;
         }
         state.error += moved << 16;

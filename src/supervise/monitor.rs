@@ -86,15 +86,12 @@ impl Monitor {
     /// Bounds of a rig.
     #[allow(clippy::float_arithmetic, reason = "SI to machine units, once at start")]
     pub fn try_build(rig: &Rig) -> Result<Self, RigError> {
-        let cross = CrossCheck::try_build(rig)?;
+        let (preload, cross) = (&rig.preload, CrossCheck::try_build(rig)?);
         Ok(Self {
-            overpressure: checked(
-                "preload.limit_n",
-                rig.preload.limit_n * (1.0 + OVERPRESSURE_PART),
-            )?,
+            overpressure: checked("preload.limit_n", preload.limit_n * (1.0 + OVERPRESSURE_PART))?,
             short: cross.short,
             short_ticks: (answer_s(rig) * f64::from(TICK_HZ)) as u16,
-            spring: checked("preload.spring_n_per_mm", rig.preload.spring_n_per_mm)?,
+            spring: checked("preload.spring_n_per_mm", preload.spring_n_per_mm)?,
             answers: LowPass::build(answer_s(rig)),
             cross,
             readback: Readback::build(rig),
@@ -126,7 +123,7 @@ impl Monitor {
         // The self-test ends once the wheel rests.
         let coasts = seen.mode == Mode::SelfTest;
         let bridge = self.readback.step(&mut state.readback, seen.bridges, coasts);
-        let crossed = self.cross_check(state, seen, off);
+        let crossed = self.check(state, seen, off);
         seen.emergency_stop
             .then_some(Fault::EmergencyStop)
             .or(seen.overrun.then_some(Fault::TickOverrun))
@@ -153,12 +150,7 @@ impl Monitor {
     }
 
     /// The sensors against one another, while a bridge is on.
-    fn cross_check(
-        &self,
-        state: &mut MonitorState,
-        seen: &Observed<'_>,
-        off: Newtons,
-    ) -> Option<Fault> {
+    fn check(&self, state: &mut MonitorState, seen: &Observed<'_>, off: Newtons) -> Option<Fault> {
         let before = core::mem::replace(&mut state.driving, seen.mode.moves());
         if state.driving {
             if !before {

@@ -108,9 +108,8 @@ impl Readback {
     #[allow(clippy::float_arithmetic, reason = "SI to machine units, once at start")]
     pub fn build(rig: &Rig) -> Self {
         let drive = &rig.drive;
-        let drive_s =
-            1e-3 * drive.reflected_mass_kg * drive.no_load_speed_mm_s / drive.stall_force_n;
-        Self { drive: Motor::build(drive_s), pretightener: Motor::build(rig.preload.lag_s) }
+        let lag_s = 1e-3 * drive.reflected_mass_kg * drive.no_load_speed_mm_s / drive.stall_force_n;
+        Self { drive: Motor::build(lag_s), pretightener: Motor::build(rig.preload.lag_s) }
     }
 
     /// One tick with the readback of the duties set before it. A wheel that may coast, as after a

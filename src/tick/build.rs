@@ -22,7 +22,9 @@ impl Controller {
     /// not fit the others.
     pub fn try_build(rig: &Rig) -> Result<Self, RigError> {
         rig.validate()?;
-        let (preload, load) = (&rig.preload, rig.plant.top_load_n * rig.plant.top_load_share);
+        let (preload, drive, plant) = (&rig.preload, &rig.drive, &rig.plant);
+        let climb = (CLIMB_PART * preload.slew_n_per_s / preload.spring_n_per_mm).min(1000.0);
+        let inertia = (drive.reflected_mass_kg + plant.moved_mass_kg) * 1e-3;
         Ok(Self {
             senses: Senses::try_build_with(rig, OBSERVER_RAD_S, FILTER_S)?,
             monitor: Monitor::try_build(rig)?,
@@ -36,23 +38,14 @@ impl Controller {
             preload_timeout: ((2.0 * preload.limit_n / preload.slew_n_per_s
                 + (2.0 * answer_s(rig)).max(1.0))
                 * f64::from(TICK_HZ)) as u32,
-            climb_speed: checked(
-                "preload.spring_n_per_mm",
-                (CLIMB_PART * preload.slew_n_per_s / preload.spring_n_per_mm).min(1000.0),
-            )?,
+            climb_speed: checked("preload.spring_n_per_mm", climb)?,
             spring: checked("preload.spring_n_per_mm", preload.spring_n_per_mm)?,
             preload_latency: checked("preload.delay_s", rig.preload_latency_s())?,
-            load: checked("plant.top_load_n", load)?,
-            arm_coupling: checked("plant.arm_coupling", rig.plant.arm_coupling)?,
-            inertia: checked(
-                "drive.reflected_mass_kg",
-                (rig.drive.reflected_mass_kg + rig.plant.moved_mass_kg) * 1e-3,
-            )?,
-            friction: checked("plant.mu", rig.plant.mu)?,
-            least_speed: checked(
-                "drive.min_crossing_speed_mm_s",
-                rig.drive.min_crossing_speed_mm_s,
-            )?,
+            load: checked("plant.top_load_n", plant.top_load_n * plant.top_load_share)?,
+            arm_coupling: checked("plant.arm_coupling", plant.arm_coupling)?,
+            inertia: checked("drive.reflected_mass_kg", inertia)?,
+            friction: checked("plant.mu", plant.mu)?,
+            least_speed: checked("drive.min_crossing_speed_mm_s", drive.min_crossing_speed_mm_s)?,
             rolling_preload: checked("control.slip_margin", rig.rolling_preload_n())?,
         })
     }

@@ -1,6 +1,6 @@
 //! Targets of the tick, and the two loops that follow them.
 
-use super::{Context, Controller, State};
+use super::{Controller, Pass, State};
 use crate::control::schedule::{Course, Targets};
 use crate::control::speed_loop::SpeedLoopState;
 use crate::numeric::{between, divide};
@@ -15,7 +15,7 @@ pub(super) const LEVEL_SLOPE: Ratio = q16(50_000);
 
 impl Controller {
     /// Where the wheel is on its run.
-    pub(super) fn course(&self, state: &State, tick: &Context<'_>, direction: Direction) -> Course {
+    pub(super) fn course(&self, state: &State, tick: &Pass<'_>, direction: Direction) -> Course {
         let (steps, estimate) = (self.estimator.steps(), &state.estimate);
         let felt = self.estimator.felt(estimate);
         Course {
@@ -36,7 +36,7 @@ impl Controller {
     }
 
     /// Schedule of this tick; holds preload and position while nothing runs.
-    pub(super) fn targets(&self, state: &mut State, tick: &mut Context<'_>) -> Targets {
+    pub(super) fn targets(&self, state: &mut State, tick: &mut Pass<'_>) -> Targets {
         let hold = Targets {
             preload: state.preload_loop.reference(tick.sensed.preload.value),
             ramping: state.approach.ramping,
@@ -115,7 +115,7 @@ impl Controller {
 
     /// A slip under this preload shows a friction below what that needs: another plan is asked for.
     /// Retracting no choice needs much less, and an edge shows a slip less well.
-    fn learn_slip(&self, state: &mut State, tick: &mut Context<'_>) {
+    fn learn_slip(&self, state: &mut State, tick: &mut Pass<'_>) {
         let lost = state.estimate.crossing.as_ref().map_or(Q16::ZERO, |open| open.slip.lost);
         let grows = lost > state.planning.lost;
         state.planning.lost = lost;
@@ -160,7 +160,7 @@ impl Controller {
     pub(super) fn actuate(
         &self,
         state: &mut State,
-        tick: &mut Context<'_>,
+        tick: &mut Pass<'_>,
         targets: &Targets,
     ) -> (MotorCommand, MotorCommand) {
         match state.mode {
@@ -204,7 +204,7 @@ impl Controller {
     fn corner(
         &self,
         state: &State,
-        tick: &Context<'_>,
+        tick: &Pass<'_>,
         target: MillimetresPerSecond,
     ) -> (Newtons, NewtonsPerSecond) {
         let (corner, direction) = (self.estimator.corner(), state.estimate.direction);
@@ -222,7 +222,7 @@ impl Controller {
     fn regulate(
         &self,
         state: &mut State,
-        tick: &Context<'_>,
+        tick: &Pass<'_>,
         targets: &Targets,
         drift: NewtonsPerSecond,
     ) -> MotorCommand {

@@ -1,7 +1,7 @@
 //! Conditions and time-outs of the modes.
 
 use super::serve::view;
-use super::{Context, Controller, Event, State};
+use super::{Controller, Event, Pass, State};
 use crate::fault::{Fault, Limit};
 use crate::supervise::startup::{SETTLED_TICKS, TEST_TICKS, UNLOADED, at_rest, silent, stowed};
 use crate::supervise::{Mode, Trigger, next};
@@ -20,7 +20,7 @@ const STOP_TICKS: u32 = 1500;
 
 impl Controller {
     /// Applies the transition that the stage asks for, and what follows from it.
-    pub(super) fn transit(&self, state: &mut State, tick: &mut Context<'_>) {
+    pub(super) fn transit(&self, state: &mut State, tick: &mut Pass<'_>) {
         while let Some(trigger) = tick.trigger.take() {
             let Some(mode) = next(state.mode, trigger) else { continue };
             if let Trigger::Fault(fault) = trigger {
@@ -36,7 +36,7 @@ impl Controller {
         }
     }
 
-    fn enter(&self, state: &mut State, tick: &mut Context<'_>, before: Mode) {
+    fn enter(&self, state: &mut State, tick: &mut Pass<'_>, before: Mode) {
         if before == Mode::Service || state.mode == Mode::Service {
             state.forget();
         }
@@ -52,7 +52,7 @@ impl Controller {
         }
     }
 
-    fn begin_run(&self, state: &mut State, tick: &mut Context<'_>, direction: Direction) {
+    fn begin_run(&self, state: &mut State, tick: &mut Pass<'_>, direction: Direction) {
         let load = self.load_of(state);
         let (found, on_corner) =
             self.estimator.begin_run(&mut state.estimate, tick.sensed, tick.now, direction, load);
@@ -65,7 +65,7 @@ impl Controller {
     }
 
     /// Checks the condition of the present mode.
-    pub(super) fn advance_mode(&self, state: &mut State, tick: &mut Context<'_>) {
+    pub(super) fn advance_mode(&self, state: &mut State, tick: &mut Pass<'_>) {
         state.in_mode = state.in_mode.saturating_add(1);
         let rests = at_rest(state.estimate.turns(tick.sensed).1);
         match state.mode {
@@ -86,7 +86,7 @@ impl Controller {
         }
     }
 
-    fn await_rest(&self, state: &mut State, tick: &mut Context<'_>, rests: bool) {
+    fn await_rest(&self, state: &mut State, tick: &mut Pass<'_>, rests: bool) {
         state.condition_ticks = if rests { state.condition_ticks + 1 } else { 0 };
         if state.condition_ticks >= TEST_TICKS {
             let pressed = self.estimator.means(tick.sensed.compression_filtered);
@@ -101,7 +101,7 @@ impl Controller {
         }
     }
 
-    fn await_zero(&self, state: &mut State, tick: &mut Context<'_>) {
+    fn await_zero(&self, state: &mut State, tick: &mut Pass<'_>) {
         match state.senses.zeroed() {
             Some(true) => tick.trigger(Trigger::Zeroed),
             None if state.in_mode < ZERO_TICKS => {}
@@ -109,7 +109,7 @@ impl Controller {
         }
     }
 
-    fn await_preload(&self, state: &mut State, tick: &mut Context<'_>, direction: Direction) {
+    fn await_preload(&self, state: &mut State, tick: &mut Pass<'_>, direction: Direction) {
         let begin = state.in_mode <= 1;
         if self.estimator.rest(&mut state.estimate, tick.sensed, tick.arm_thrust, begin) {
             tick.log(Event::Limit(Limit::CompressionStrange));
@@ -129,7 +129,7 @@ impl Controller {
     }
 
     /// The end of travel, confirmed by the arm.
-    fn await_arrival(&self, state: &mut State, tick: &mut Context<'_>, direction: Direction) {
+    fn await_arrival(&self, state: &mut State, tick: &mut Pass<'_>, direction: Direction) {
         let steps = self.estimator.steps();
         let remaining = steps.remaining(direction, state.estimate.position);
         if !steps.arrived(remaining) || state.profile.speed() != Q16::ZERO {
@@ -161,7 +161,7 @@ mod tests {
     use crate::supervise::Command;
     use crate::units::q16;
 
-    fn advance(controller: &Controller, state: &mut State, tick: &mut Context<'_>) {
+    fn advance(controller: &Controller, state: &mut State, tick: &mut Pass<'_>) {
         controller.advance_mode(state, tick);
         controller.transit(state, tick);
     }

@@ -1,6 +1,6 @@
 //! The exchange with the model task.
 
-use super::{Context, Controller, CrossingRecord, Event, State};
+use super::{Controller, CrossingRecord, Event, Pass, State};
 use crate::estimate::OpenCrossing;
 use crate::fault::{Fault, Limit};
 use crate::model::plan::PLAN_TICKS;
@@ -18,7 +18,7 @@ const ANSWER_TICKS: u32 = 500;
 
 impl Controller {
     /// Asks the model for the schedule of the step ahead.
-    pub(super) fn ask(&self, state: &mut State, tick: &mut Context<'_>) {
+    pub(super) fn ask(&self, state: &mut State, tick: &mut Pass<'_>) {
         let (planning, estimate) = (&mut state.planning, &state.estimate);
         planning.sequence = planning.sequence.wrapping_add(1);
         planning.asked = 1;
@@ -41,7 +41,7 @@ impl Controller {
     }
 
     /// Takes the model's answer if it is the one waited for.
-    pub(super) fn take_plan(&self, state: &mut State, tick: &mut Context<'_>, plan: Option<&Plan>) {
+    pub(super) fn take_plan(&self, state: &mut State, tick: &mut Pass<'_>, plan: Option<&Plan>) {
         let planning = &mut state.planning;
         if let Some(plan) = plan.filter(|plan| plan.sequence == planning.sequence) {
             planning.answer = Some(*plan);
@@ -97,7 +97,7 @@ impl Controller {
     pub(super) fn note_preload(
         &self,
         state: &mut State,
-        tick: &mut Context<'_>,
+        tick: &mut Pass<'_>,
         cross_preload: Newtons,
         waiting: bool,
     ) {
@@ -124,7 +124,7 @@ impl Controller {
 }
 
 /// Reports a crossing with the model's review.
-fn record(tick: &mut Context<'_>, open: &OpenCrossing, outcome: &Outcome) {
+fn record(tick: &mut Pass<'_>, open: &OpenCrossing, outcome: &Outcome) {
     let Some(point) = open.lift else { return };
     tick.log(Event::Crossing(CrossingRecord {
         index: open.step,

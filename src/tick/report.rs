@@ -1,6 +1,6 @@
 //! Reports of a tick: findings of the estimate, contact stage, vibration, telemetry.
 
-use super::{Context, Controller, Event, State, Telemetry};
+use super::{Controller, Event, Pass, State, Telemetry};
 use crate::control::schedule::Targets;
 use crate::estimate::crossing::Contact;
 use crate::estimate::{ContactStage, Findings, PositionConfidence, Shown};
@@ -14,7 +14,7 @@ use crate::units::{Q16, q16};
 use super::state::Approach;
 
 impl Controller {
-    pub(super) fn take_findings(&self, state: &mut State, tick: &mut Context<'_>, found: Findings) {
+    pub(super) fn take_findings(&self, state: &mut State, tick: &mut Pass<'_>, found: Findings) {
         found.limits.into_iter().for_each(|limit| tick.log(Event::Limit(limit)));
         if let Some(slip) = found.slip {
             tick.log(Event::Limit(Limit::WheelSlipped));
@@ -52,7 +52,7 @@ impl Controller {
     /// What the tread and the drive have shown before the first crossing; whether it is other than
     /// known. What a crossing has shown of the tread goes before it. A load that the tread does not
     /// bear is none: duty and speed of the drive do not match.
-    fn learn(&self, learned: &mut Learned, shown: &Shown, tick: &mut Context<'_>) -> bool {
+    fn learn(&self, learned: &mut Learned, shown: &Shown, tick: &mut Pass<'_>) -> bool {
         let before = learned.extra_load;
         if let Some(load) = shown.load {
             // Within two sigmas of it, the known load is the better one.
@@ -79,13 +79,13 @@ impl Controller {
 
     /// Observes the arm's mode from the approach to a step until the step is passed. The observer
     /// starts again each time, so its earlier state does not matter.
-    pub(super) fn follow_vibration(&self, state: &mut State, tick: &Context<'_>) {
+    pub(super) fn follow_vibration(&self, state: &mut State, tick: &Pass<'_>) {
         let awake = matches!(state.mode, Mode::Run(_, Leg::Approach | Leg::Crossing));
         let compression = tick.sensed.compression.value;
         self.vibration.track(&mut state.vibration, compression, awake, self.skipping);
     }
 
-    pub(super) fn note_stage(&self, state: &mut State, tick: &mut Context<'_>) {
+    pub(super) fn note_stage(&self, state: &mut State, tick: &mut Pass<'_>) {
         let stage = match (state.mode, state.estimate.contact()) {
             (Mode::Run(..) | Mode::Stopping(_), Contact::Both) => ContactStage::StaticFriction,
             (Mode::Run(..) | Mode::Stopping(_), Contact::Corner) => ContactStage::Sliding,
@@ -101,12 +101,7 @@ impl Controller {
         }
     }
 
-    pub(super) fn telemetry(
-        &self,
-        state: &State,
-        tick: &Context<'_>,
-        targets: &Targets,
-    ) -> Telemetry {
+    pub(super) fn telemetry(&self, state: &State, tick: &Pass<'_>, targets: &Targets) -> Telemetry {
         let crossing = matches!(state.mode, Mode::Run(_, Leg::Crossing | Leg::Approach));
         let plan = state.planning.plan.as_ref();
         let friction = self.friction.min(state.planning.learned.slips);

@@ -1,6 +1,6 @@
 //! The service mode in the tick.
 
-use super::{Context, Controller, Event, State};
+use super::{Controller, Event, Pass, State};
 use crate::sense::SensedState;
 use crate::supervise::service::ServiceView;
 use crate::supervise::{Mode, ServiceDuties, Trigger};
@@ -21,7 +21,7 @@ impl Controller {
     pub(super) fn take_service(
         &self,
         state: &mut State,
-        tick: &mut Context<'_>,
+        tick: &mut Pass<'_>,
         request: Option<ServiceDuties>,
     ) {
         let Some(request) = request else { return };
@@ -37,7 +37,7 @@ impl Controller {
     pub(super) fn serve(
         &self,
         state: &mut State,
-        tick: &mut Context<'_>,
+        tick: &mut Pass<'_>,
     ) -> (MotorCommand, MotorCommand) {
         let (duties, limit) = state.service.step(&view(tick.sensed));
         if let Some(limit) = limit {

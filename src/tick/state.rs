@@ -122,15 +122,14 @@ impl State {
 
     /// Speed that brings a wheel which brakes to rest back to where its profile has it, mm/s outwards.
     pub(super) fn make_up(&mut self, target: MillimetresPerSecond) -> MillimetresPerSecond {
-        let (position, speed) =
-            (self.estimate.position.widen(), self.outwards(self.profile.speed()));
+        let (at, speed) = (self.estimate.position.widen(), self.outwards(self.profile.speed()));
         if target != Q16::ZERO || speed == Q16::ZERO || !matches!(self.mode, Mode::Run(..)) {
             self.brake_position = None;
             return Q16::ZERO;
         }
-        let planned = self.brake_position.unwrap_or(position).saturating_add(per_tick(speed));
+        let planned = self.brake_position.unwrap_or(at).saturating_add(per_tick(speed));
         self.brake_position = Some(planned);
-        Q16::narrow(planned.saturating_sub(position)).clamp(-MOST_BEHIND, MOST_BEHIND) * CLOSES
+        Q16::narrow(planned.saturating_sub(at)).clamp(-MOST_BEHIND, MOST_BEHIND) * CLOSES
     }
 
     /// Part of a corner's feed-forward that is blended in, 0 to 1, after one more tick, and what

@@ -79,12 +79,12 @@ pub(super) fn answering() -> SensedState {
 /// Does something in a tick with these readings.
 pub(super) fn within<T>(
     sensed: &SensedState,
-    act: impl FnOnce(&Controller, &mut Context<'_>) -> T,
+    act: impl FnOnce(&Controller, &mut Pass<'_>) -> T,
 ) -> T {
     let controller = Controller::try_build(&Rig::prototype()).expect("sound");
     let mut output = Output::default();
     let (arm_thrust, output) = (Q16::ZERO, &mut output);
-    act(&controller, &mut Context { now: 0, sensed, arm_thrust, trigger: None, output })
+    act(&controller, &mut Pass { now: 0, sensed, arm_thrust, trigger: None, output })
 }
 
 #[test]
@@ -177,7 +177,7 @@ fn the_duty_shows_the_load_only_at_a_steady_speed() {
             sensed.preload.value = Q16::from_bits((now % 7) as i32);
             sensed.compression.value = sensed.preload.value;
             let (arm_thrust, output) = (Q16::ZERO, &mut output);
-            let mut tick = Context { now, sensed: &sensed, arm_thrust, trigger: None, output };
+            let mut tick = Pass { now, sensed: &sensed, arm_thrust, trigger: None, output };
             controller.look_for_faults(&mut state, &mut tick, &input);
             controller.transit(&mut state, &mut tick);
             if let Mode::FaultHold(fault) = state.mode { Some(fault) } else { None }

@@ -134,7 +134,7 @@ impl Planner {
             (scene.preload + rising * self.pretightener.rate).min(scene.most.max(scene.preload))
         };
         // What lies before the tread's first stride is driven without it.
-        let mut follower = Follower::new(speed);
+        let mut follower = Follower { profile: ProfileState::at(speed), ..Follower::default() };
         let mut distance = start;
         let (mut ticks_in_all, mut steps) = (0, 0_u32);
         while distance > from && ticks_in_all < MOST_TICKS_BEFORE {
@@ -233,6 +233,7 @@ impl Planner {
 }
 
 /// The speed that the tick asks for on its way over a corner, and that the wheel has.
+#[derive(Default)]
 struct Follower {
     profile: ProfileState,
     begun: Begun,
@@ -242,15 +243,6 @@ struct Follower {
 }
 
 impl Follower {
-    fn new(speed: MillimetresPerSecond) -> Self {
-        Self {
-            profile: ProfileState::at(speed),
-            begun: Begun::default(),
-            felt: false,
-            lags: Q16::ZERO,
-        }
-    }
-
     fn speed(&self) -> MillimetresPerSecond {
         (self.profile.speed() - self.lags).max(LEAST_SPEED)
     }

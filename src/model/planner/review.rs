@@ -169,11 +169,10 @@ impl Planner {
         let stiffer = known.scale * STIFFER;
         let other = self.rolled((state, pause), review, load, stiffer).await;
         // Change of the gap with the logarithm of the stiffness, as a part of it.
-        let sensitivity =
-            divide(other.gap - rolled.gap, rolled.gap * LN_STIFFER).max(LEAST_SENSITIVITY);
+        let slope = divide(other.gap - rolled.gap, rolled.gap * LN_STIFFER).max(LEAST_SENSITIVITY);
         let missed = divide(review.gap_as_table - rolled.gap, rolled.gap);
-        let seen = between(divide(missed, sensitivity), -MOST_OFF, MOST_OFF);
-        let error = divide(MEASURED_WITHIN, rolled.gap * sensitivity);
+        let seen = between(divide(missed, slope), -MOST_OFF, MOST_OFF);
+        let error = divide(MEASURED_WITHIN, rolled.gap * slope);
         // Rubber and measurement, three deviations of each.
         outcome.strange = seen.abs() > (KNOWN_DEVIATION + error) * q16(3_000_000);
         // The first crossing shows a tread no stiffer than the known one: it was softer, and is

@@ -87,10 +87,9 @@ impl<'a, P: AsyncFnMut()> Search<'a, P> {
     /// The fastest course.
     pub(super) async fn fastest(&mut self) -> Course {
         let planner = self.planner;
-        let fastest =
-            planner.prescribed_speed.unwrap_or(planner.cruise_speed.min(planner.climb_speed));
+        let top = planner.prescribed_speed.unwrap_or(planner.cruise_speed.min(planner.climb_speed));
         // As fast as it goes.
-        let at_once = self.roll(fastest, Q16::ZERO, self.ceiling).await;
+        let at_once = self.roll(top, Q16::ZERO, self.ceiling).await;
         if self.fits(&at_once.rolled) && self.price(&at_once.rolled) == Q16::ZERO {
             return at_once;
         }
@@ -103,7 +102,7 @@ impl<'a, P: AsyncFnMut()> Search<'a, P> {
         };
         let (mut window, mut best, mut least) = (self.floor, Q16::ZERO, Q16::MAX);
         for &release in releases {
-            let (at, cost) = self.window(fastest, release).await;
+            let (at, cost) = self.window(top, release).await;
             if cost < least {
                 (window, best, least) = (at, release, cost);
             }
@@ -115,7 +114,7 @@ impl<'a, P: AsyncFnMut()> Search<'a, P> {
             }
             window = (window * q16(600_000)).max(self.floor);
             best = if self.releases { RELEASES[1] } else { Q16::ZERO };
-            least = self.cost_on_target(window, best).await;
+            least = self.costs(window, best).await;
         }
         let course = self.solve(window, best).await;
         self.gripping(window, best, course).await
@@ -129,35 +128,28 @@ impl<'a, P: AsyncFnMut()> Search<'a, P> {
     ) -> (MillimetresPerSecond, Seconds) {
         let (mut low, mut high) = (self.floor, fastest);
         let mut inner = [high - (high - low) * GOLDEN, low + (high - low) * GOLDEN];
-        let mut costs = [
-            self.cost_on_target(inner[0], release).await,
-            self.cost_on_target(inner[1], release).await,
-        ];
+        let mut costs = [self.costs(inner[0], release).await, self.costs(inner[1], release).await];
         for _ in 2..WINDOWS {
             let [slower, faster] = costs;
             if slower < faster {
                 high = inner[1];
                 inner = [high - (high - low) * GOLDEN, inner[0]];
-                costs = [self.cost_on_target(inner[0], release).await, slower];
+                costs = [self.costs(inner[0], release).await, slower];
             } else {
                 low = inner[0];
                 inner = [inner[1], low + (high - low) * GOLDEN];
-                costs = [faster, self.cost_on_target(inner[1], release).await];
+                costs = [faster, self.costs(inner[1], release).await];
             }
         }
         // The section does not come to its ends.
-        let last = self.cost_on_target(fastest, release).await;
+        let last = self.costs(fastest, release).await;
         let windows = [(inner[0], costs[0]), (inner[1], costs[1]), (fastest, last)];
         windows.into_iter().min_by_key(|(_, cost)| *cost).unwrap_or((fastest, last))
     }
 
-    /// Time of the course with this window and release whose gap is the target, s, by
+    /// Time that the course with this window and release costs whose gap is the target, s, by
     /// interpolation between the last two that come near it.
-    async fn cost_on_target(
-        &mut self,
-        window: MillimetresPerSecond,
-        release: Millimetres,
-    ) -> Seconds {
+    async fn costs(&mut self, window: MillimetresPerSecond, release: Millimetres) -> Seconds {
         let [course, before] = self.approach_target(window, release, NEAR).await;
         let (gap, cost) = (course.rolled.gap, self.cost(&course));
         let slowest = course.approach.slowest_speed;
@@ -264,10 +256,8 @@ impl<'a, P: AsyncFnMut()> Search<'a, P> {
         slowest: MillimetresPerSecond,
     ) -> Course {
         let approach = self.shape(window.max(slowest), release, slowest);
-        let rolled = self
-            .planner
-            .roll_out((&mut *self.state, &mut *self.pause), &self.scene, &approach)
-            .await;
+        let rolling = (&mut *self.state, &mut *self.pause);
+        let rolled = self.planner.roll_out(rolling, &self.scene, &approach).await;
         Course { approach, rolled }
     }
 
