@@ -7,7 +7,6 @@ mod event;
 mod modes;
 mod plans;
 mod report;
-mod serve;
 mod state;
 mod telemetry;
 
@@ -174,7 +173,9 @@ impl Controller {
         self.look_for_faults(state, tick, input);
         self.transit(state, tick);
         self.take_command(state, tick, input.command);
-        self.take_service(state, tick, input.service);
+        if let Some(request) = input.service {
+            self.take_duties(state, tick, request);
+        }
         self.advance_mode(state, tick);
         self.transit(state, tick);
         self.follow_contact(state, tick);
@@ -183,7 +184,7 @@ impl Controller {
         self.transit(state, tick);
         let (drive, preload) = self.actuate(state, tick, &targets);
         (tick.output.drive, tick.output.preload) = (drive, preload);
-        state.monitor.set_duties(drive.duty, preload.duty);
+        state.monitor.readback.set_duties(drive.duty, preload.duty);
         self.note_stage(state, tick);
         self.follow_vibration(state, tick);
         tick.output.telemetry = self.telemetry(state, tick, &targets);

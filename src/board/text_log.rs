@@ -129,10 +129,7 @@ impl Journal for TextLog {
 /// The ledger line in physical units.
 fn crossing(at: u32, record: &CrossingRecord) {
     let value = Q16::to_num::<f32>;
-    let direction = match record.direction {
-        Direction::Deploy => "deploying",
-        Direction::Retract => "retracting",
-    };
+    let direction = if record.direction == Direction::Deploy { "deploying" } else { "retracting" };
     info!(
         "[{=u32} ms] step {=u8} {=str}: at {=f32} mm ({=f32} off), {=f32} mm/s, preload {=f32} N (peak {=f32}) {=f32} s ahead, tread {=f32} mm, gap {=f32} mm (predicted {=f32}), slip margin {=f32}, stiffness x{=f32}, limited by {=str}",
         at,

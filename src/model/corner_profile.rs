@@ -82,10 +82,7 @@ impl CornerProfile {
 
     /// Distance to the face at which the corner may first touch in this direction, mm.
     pub const fn first_contact(&self, direction: Direction) -> Millimetres {
-        match direction {
-            Direction::Deploy => self.touch,
-            Direction::Retract => self.patch,
-        }
+        if matches!(direction, Direction::Deploy) { self.touch } else { self.patch }
     }
 
     /// Distance behind an edge after which the patch is clear of it, mm.
@@ -102,10 +99,7 @@ impl CornerProfile {
         // The load passes from wall to corner between first touch and lift-off. Back it passes
         // within a few tenths of that travel: the relaxed tread is still deep at the corner.
         let [.., out, back] = self.per;
-        let per = match direction {
-            Direction::Deploy => out,
-            Direction::Retract => back,
-        };
+        let per = if direction == Direction::Deploy { out } else { back };
         let part = Ratio::ONE - (ahead - self.lift).max(Q16::ZERO) * per;
         self.on_edge(ahead.min(self.lift)) * DRIVE_SLOPE_PART * part.max(Ratio::ZERO)
     }

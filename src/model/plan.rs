@@ -152,7 +152,7 @@ pub struct Outcome {
 }
 
 /// Speed and preload up to the next step and over it.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Plan {
     /// Sequence of the request answered.
     pub sequence: u32,

@@ -173,10 +173,6 @@ impl Planner {
             gap: self.aimed[request.direction as usize],
             slip_margin: self.usable,
             slips: learned.slips,
-            short: false,
-            brake_distance: Millimetres::ZERO,
-            brake_time: Seconds::ZERO,
-            brake_horizon: Millimetres::ZERO,
             approach: Approach {
                 window_speed: cruise_speed,
                 slowest_speed: cruise_speed,
@@ -187,6 +183,7 @@ impl Planner {
             limited_by: LimitedBy::Drive,
             limits,
             outcome,
+            ..Plan::default()
         };
         if request.step > 0 {
             // The speed at which a tread that is not as known has kept the gap keeps it again: that of
@@ -226,13 +223,15 @@ impl Planner {
 
     fn scene(&self, request: &PlanRequest, cruise: MillimetresPerSecond) -> Scene {
         let learned = &request.learned;
+        let index = usize::from(request.step).saturating_sub(1);
+        let tangent = self.tangents.get(index).copied().unwrap_or_default();
         Scene {
             direction: request.direction,
             load: self.load + learned.extra_load,
             felt_at: self.felt_at(request),
             scale: learned.scale * (Ratio::ONE + SIGMAS * learned.deviation),
             cruise,
-            arm_thrust: self.arm_thrust_at(request),
+            arm_thrust: self.thrust(learned, tangent),
             preload: request.preload,
             most: self.most(),
             reacts: self.strategy == Strategy::Reactive,
@@ -259,10 +258,8 @@ impl Planner {
         let floor = self.least_speed.max(kept).min(plan.cruise_speed);
         // No faster than the pre-tightener can follow the spring over the corner.
         let ceiling = plan.cruise_speed.min(self.climb_speed.max(floor));
-        let (floor, ceiling) = match self.prescribed_speed {
-            Some(speed) => (speed, speed),
-            None => (floor, ceiling),
-        };
+        let ends = self.prescribed_speed.map_or((floor, ceiling), |speed| (speed, speed));
+        let (floor, ceiling) = ends;
         let mut search =
             Search::new(self, (&mut *state, &mut *pause), scene, request, (floor, ceiling));
         let course = search.fastest().await;
@@ -364,25 +361,13 @@ impl Planner {
         (self.load + learned.extra_load) * self.coupling * tan_arm
     }
 
-    fn arm_thrust_at(&self, request: &PlanRequest) -> Newtons {
-        let index = usize::from(request.step).saturating_sub(1);
-        let tangent = self.tangents.get(index).copied().unwrap_or_default();
-        self.thrust(&request.learned, tangent)
-    }
-
     fn between_steps(&self) -> Newtons {
-        match self.strategy {
-            Strategy::Limit => self.most_preload,
-            _ => self.cruise_preload,
-        }
+        if self.strategy == Strategy::Limit { self.most_preload } else { self.cruise_preload }
     }
 
     /// Highest preload that the strategy allows, N.
     fn most(&self) -> Newtons {
-        match self.strategy {
-            Strategy::Constant => self.cruise_preload,
-            _ => self.most_preload,
-        }
+        if self.strategy == Strategy::Constant { self.cruise_preload } else { self.most_preload }
     }
 
     /// Preload from which the wheel may roll, N: at a prescribed speed all that it is to have.
@@ -393,16 +378,11 @@ impl Planner {
     /// Distance along the run to the face at lift-off (retract: touch-down) with this gap, mm.
     fn lift(&self, direction: Direction, gap: Millimetres) -> Millimetres {
         // The tread's memory leaves the wall before the centre is as high as the free wheel's.
-        let height = match direction {
-            Direction::Deploy => self.radius - SHORT,
-            Direction::Retract => self.radius,
-        };
+        let deploys = direction == Direction::Deploy;
+        let height = if deploys { self.radius - SHORT } else { self.radius };
         let reach = self.radius + gap;
         let lift = sqrt((reach - height) * (reach + height));
-        match direction {
-            Direction::Deploy => lift,
-            Direction::Retract => -lift,
-        }
+        if deploys { lift } else { -lift }
     }
 
     /// Time that a change between these speeds takes longer than its distance at cruise speed, s.

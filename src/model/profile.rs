@@ -48,7 +48,9 @@ impl Profile {
     pub fn step(&self, state: &mut ProfileState, target: MillimetresPerSecond) {
         let target = target.max(Q16::ZERO);
         let missing = target - state.speed();
-        if missing.abs() <= self.snap() && state.acceleration.abs() <= self.jerk_per_tick {
+        // Speed error that one more tick of full jerk would overshoot, mm/s.
+        let snap = Q16::narrow(per_tick(self.jerk_per_tick)) + Q16::DELTA;
+        if missing.abs() <= snap && state.acceleration.abs() <= self.jerk_per_tick {
             state.speed = target.widen();
             state.acceleration = Q16::ZERO;
             return;
@@ -59,11 +61,6 @@ impl Profile {
         let change = between(wanted - state.acceleration, -self.jerk_per_tick, self.jerk_per_tick);
         state.acceleration += change;
         state.speed = state.speed.saturating_add(per_tick(state.acceleration)).max(Travel::ZERO);
-    }
-
-    /// Speed error that one more tick of full jerk would overshoot, mm/s.
-    fn snap(&self) -> MillimetresPerSecond {
-        Q16::narrow(per_tick(self.jerk_per_tick)) + Q16::DELTA
     }
 }
 

@@ -73,17 +73,13 @@ impl LiftOff {
             }
             return;
         }
-        let found = match direction {
-            Direction::Deploy => carried && !carries,
-            Direction::Retract => !carried && carries,
-        };
-        if found {
-            let part = match direction {
-                Direction::Deploy => divide(before.floor, before.floor - now.floor),
-                Direction::Retract => {
-                    let left = before.centre - tread.radius();
-                    between(divide(left, before.centre - now.centre), Q16::ZERO, Q16::ONE)
-                }
+        let deploys = direction == Direction::Deploy;
+        if carried == deploys && carries != deploys {
+            let part = if deploys {
+                divide(before.floor, before.floor - now.floor)
+            } else {
+                let left = before.centre - tread.radius();
+                between(divide(left, before.centre - now.centre), Q16::ZERO, Q16::ONE)
             };
             let mix = |a: Q16, b: Q16| a + part * (b - a);
             let there = Contact {
@@ -135,15 +131,9 @@ pub fn roll(
     mut course: impl FnMut(Millimetres) -> (MillimetresPerSecond, Newtons),
 ) -> Rolled {
     let forward = run.direction == Direction::Deploy;
-    let mut drive = Drive {
-        direction: run.direction,
-        axial: run.axial,
-        pressed: course(run.from).1,
-        duration: Q16::ZERO,
-        gives: Q16::ZERO,
-        scale: run.scale,
-        level: run.level,
-    };
+    let Run { direction, axial, scale, level, .. } = *run;
+    let pressed = course(run.from).1;
+    let mut drive = Drive { direction, axial, pressed, scale, level, ..Drive::default() };
     tread.put_down(state, run.from, &drive);
     let mut rolled = Rolled::default();
     let mut position = run.from;

@@ -55,16 +55,17 @@ pub struct Tread {
 }
 
 /// How the wheel is moved.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Axial {
     /// Pushed at its axle along a frictionless wall.
+    #[default]
     Pushed,
     /// Turned by torque against this load along the sleeve outwards, N.
     Driven(Newtons),
 }
 
 /// What presses and moves the wheel in a stride.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Drive {
     /// Direction of the run.
     pub direction: Direction,

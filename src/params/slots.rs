@@ -53,10 +53,7 @@ pub enum Slot {
 impl Slot {
     /// The other one.
     pub const fn other(self) -> Self {
-        match self {
-            Self::A => Self::B,
-            Self::B => Self::A,
-        }
+        if matches!(self, Self::A) { Self::B } else { Self::A }
     }
 }
 

@@ -59,7 +59,10 @@ impl Restart {
         let snapshot = self
             .snapshot
             .filter(|snapshot| snapshot.packed_speed.placed() && spared(snapshot.fault))?;
-        let unwatched = match (self.reset, self.crash.map(|crash| crash.stopped)) {
+        let stopped = self.crash.map(|crash| crash.stopped);
+        // For an unknown time since the record.
+        let without_supply = self.reset == Reset::Power || stopped == Some(Stopped::Supply);
+        let unwatched = match (self.reset, stopped) {
             (_, Some(Stopped::Hang { at, .. })) => at.wrapping_sub(snapshot.tick).min(UNFED),
             (Reset::Watchdog, None) => UNFED,
             _ => 0,
@@ -67,15 +70,9 @@ impl Restart {
         let travel = snapshot.packed_speed.speed() * ticks_to_seconds(unwatched + COASTS);
         Some(Place {
             position: snapshot.position + travel,
-            sure: unwatched <= FRESH && !self.was_away() && snapshot.level < DriveSnapshot::UNSURE,
+            sure: unwatched <= FRESH && !without_supply && snapshot.level < DriveSnapshot::UNSURE,
             zeros: snapshot.packed_zeros.zeros(),
         })
-    }
-
-    /// Whether the supply was off, for an unknown time, since the record.
-    fn was_away(&self) -> bool {
-        let fell = self.crash.is_some_and(|crash| crash.stopped == Stopped::Supply);
-        fell || self.reset == Reset::Power
     }
 
     /// What a start keeps of it until the first tick, for a reset that comes before: the wheel

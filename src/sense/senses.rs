@@ -78,18 +78,15 @@ impl Senses {
     /// time constant, s, for the others.
     #[allow(clippy::float_arithmetic, reason = "SI to machine units, once at start")]
     pub fn try_build_with(rig: &Rig, observer_rad_s: f64, filter_s: f64) -> Result<Self, RigError> {
-        let arm = Arm::try_build(rig)?;
+        let (arm, sense) = (Arm::try_build(rig)?, &rig.sense);
         let channel = |key, full_scale| AnalogChannel::try_build(key, full_scale, filter_s);
         Ok(Self {
             wheel_encoder: Speedometer::try_build(rig, observer_rad_s)?,
-            preload_sensor: channel("sense.preload_full_scale_n", rig.sense.preload_full_scale_n)?,
-            compression_sensor: channel(
-                "sense.tread_full_scale_mm",
-                rig.sense.tread_full_scale_mm,
-            )?,
-            arm_angle: AngleSensor::build(rig.sense.angle_zero_code, arm.reach, filter_s),
+            preload_sensor: channel("sense.preload_full_scale_n", sense.preload_full_scale_n)?,
+            compression_sensor: channel("sense.tread_full_scale_mm", sense.tread_full_scale_mm)?,
+            arm_angle: AngleSensor::build(sense.angle_zero_code, arm.reach, filter_s),
             arm,
-            limit: libm::round(rig.sense.stale_after_s * f64::from(TICK_HZ)) as u32,
+            limit: libm::round(sense.stale_after_s * f64::from(TICK_HZ)) as u32,
         })
     }
 
@@ -107,15 +104,13 @@ impl Senses {
         frame: &SensorFrame,
         acceleration: MillimetresPerSecond2,
     ) -> SensedState {
-        let limit = self.limit;
+        let (wheel, tread, limit) = (&self.wheel_encoder, &self.compression_sensor, self.limit);
         let counted = frame.get(SensorId::WheelEncoder, EncoderCount::new);
-        let motion =
-            self.wheel_encoder.step(&mut state.wheel_encoder, now, counted, acceleration, limit);
+        let motion = wheel.step(&mut state.wheel_encoder, now, counted, acceleration, limit);
         let code = frame.get(SensorId::PreloadSensor, AdcCode::new);
         let preload = self.preload_sensor.step(&mut state.preload_sensor, now, code, limit);
         let code = frame.get(SensorId::CompressionSensor, AdcCode::new);
-        let compression =
-            self.compression_sensor.step(&mut state.compression_sensor, now, code, limit);
+        let compression = tread.step(&mut state.compression_sensor, now, code, limit);
         let turned = frame.get(SensorId::ArmAngle, AngleFrame::new);
         let angle = self.arm_angle.step(&mut state.arm_angle, now, turned, limit);
         let (radius, tan_arm) = self.arm.stance(angle.filtered);
@@ -144,18 +139,6 @@ impl SensedState {
     pub const fn validities(&self) -> [Validity; 4] {
         let Self { speed, preload, compression, radius, .. } = self;
         [speed.validity, preload.validity, compression.validity, radius.validity]
-    }
-
-    /// The same, to be set.
-    #[cfg(test)]
-    pub(crate) const fn validities_mut(&mut self) -> [&mut Validity; 4] {
-        let Self { speed, preload, compression, radius, .. } = self;
-        [
-            &mut speed.validity,
-            &mut preload.validity,
-            &mut compression.validity,
-            &mut radius.validity,
-        ]
     }
 }
 
@@ -203,6 +186,19 @@ impl SensesState {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    impl SensedState {
+        /// As [`SensedState::validities`], to be set.
+        pub(crate) const fn validities_mut(&mut self) -> [&mut Validity; 4] {
+            let Self { speed, preload, compression, radius, .. } = self;
+            [
+                &mut speed.validity,
+                &mut preload.validity,
+                &mut compression.validity,
+                &mut radius.validity,
+            ]
+        }
+    }
 
     /// What the sensors of the prototype give in a state of the mechanism.
     #[derive(Clone, Copy)]

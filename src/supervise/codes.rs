@@ -23,10 +23,7 @@ pub const fn of_mode(mode: Mode) -> u8 {
         Mode::FaultHold(fault) => return fault.code() as u8,
         Mode::Service => return 4 + 2 * OF_DIRECTION,
     };
-    match direction {
-        Direction::Deploy => first,
-        Direction::Retract => first + OF_DIRECTION,
-    }
+    if matches!(direction, Direction::Deploy) { first } else { first + OF_DIRECTION }
 }
 
 /// The mode of a number; none if the number has no meaning.

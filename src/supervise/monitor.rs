@@ -10,7 +10,7 @@ use crate::rig::{OVERPRESSURE_PART, Rig, RigError};
 use crate::sense::raw::BridgeCodes;
 use crate::sense::{Reason, SensedState, Validity};
 use crate::units::{
-    Duty, Millimetres, MillimetresPerSecond, Newtons, Q16, Ratio, TICK_HZ, Tick, Travel, q16,
+    Millimetres, MillimetresPerSecond, Newtons, Q16, Ratio, TICK_HZ, Tick, Travel, q16,
 };
 
 /// Ticks that overpressure must last, longer than noise.
@@ -51,7 +51,7 @@ pub struct MonitorState {
     answered: Option<LowPassState>,
     cross: CrossState,
     noise: Noise,
-    readback: ReadbackState,
+    pub(crate) readback: ReadbackState,
 }
 
 /// Inputs of the monitor.
@@ -167,13 +167,6 @@ impl Monitor {
             }
             None
         }
-    }
-}
-
-impl MonitorState {
-    /// Sets the bridges' duties until the next tick; 0 with the bridge off.
-    pub fn set_duties(&mut self, drive: Duty, pretightener: Duty) {
-        self.readback.set_duties(drive, pretightener);
     }
 }
 

@@ -2,7 +2,7 @@ use super::*;
 use crate::sense::Reading;
 use crate::sense::raw::BridgeCode;
 use crate::supervise::Leg;
-use crate::units::{Direction, Q16, Travel};
+use crate::units::{Direction, Duty, Q16, Travel};
 use proptest::prelude::*;
 
 const RUN: Mode = Mode::Run(Direction::Deploy, Leg::Cruise);
@@ -208,7 +208,7 @@ fn a_wheel_driven_in_the_service_mode_may_turn_and_for_a_moment_after() {
         let duty = Duty::from_bits(if tick < 500 { 4369 } else { 0 });
         let code = BridgeCode::of(duty.to_bits().into());
         let codes = BridgeCodes { drive: code, pretightener: BridgeCode::of(0) };
-        state.set_duties(duty, Duty::ZERO);
+        state.readback.set_duties(duty, Duty::ZERO);
         let seen = Observed { bridges: Some(codes), ..observed(Mode::Service, &turning) };
         monitor.step(&mut state, &seen).map(|fault| (fault, tick))
     });

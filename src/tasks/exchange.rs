@@ -193,10 +193,8 @@ impl Exchange {
 
     /// Passes the host's reset to the tick.
     pub(super) fn reset(&self) -> Response {
-        match self.commands.try_send(Command::Reset) {
-            Ok(()) => Response::Done,
-            Err(_) => Response::Refused(Refusal::Busy),
-        }
+        let sent = self.commands.try_send(Command::Reset);
+        sent.map_or(Response::Refused(Refusal::Busy), |()| Response::Done)
     }
 
     /// Log entries dropped since boot because the journal did not keep up.

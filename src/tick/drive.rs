@@ -71,7 +71,7 @@ impl Controller {
         }
         let found = self.estimator.watch_expectation(&mut state.estimate);
         self.take_findings(state, tick, found);
-        targets.speed = self.limit_climb(state, targets.speed);
+        targets.speed = self.climb(state, targets.speed);
         let surprised = state.estimate.slow_down();
         let unplanned = plan.step != state.estimate.next_step;
         if surprised || unplanned {
@@ -131,24 +131,16 @@ impl Controller {
 
     /// On a corner the wheel's rise compresses the spring: limits the speed to what the
     /// pre-tightener can follow.
-    pub(super) fn limit_climb(
-        &self,
-        state: &State,
-        speed: MillimetresPerSecond,
-    ) -> MillimetresPerSecond {
+    pub(super) fn climb(&self, state: &State, speed: MillimetresPerSecond) -> MillimetresPerSecond {
         if !state.estimate.on_corner() {
             return speed;
         }
-        self.followed(speed, self.estimator.corner().slope(self.ahead(state, Q16::ZERO)))
+        self.follow(speed, self.estimator.corner().slope(self.ahead(state, Q16::ZERO)))
     }
 
     /// `speed`, or the largest below it at which the pre-tightener still follows a spring
     /// that moves on this slope, mm/s: `v s <= v_rise`.
-    pub(super) fn followed(
-        &self,
-        speed: MillimetresPerSecond,
-        slope: Ratio,
-    ) -> MillimetresPerSecond {
+    pub(super) fn follow(&self, speed: MillimetresPerSecond, slope: Ratio) -> MillimetresPerSecond {
         if slope > LEVEL_SLOPE && speed * slope > self.climb_speed {
             speed.min(divide(self.climb_speed, slope))
         } else {

@@ -1,11 +1,13 @@
-//! Conditions and time-outs of the modes.
+//! Conditions and time-outs of the modes, and the service mode in the tick.
 
-use super::serve::view;
+use super::state::BLEND_TICKS;
 use super::{Controller, Event, Pass, State};
 use crate::fault::{Fault, Limit};
+use crate::sense::SensedState;
+use crate::supervise::service::ServiceView;
 use crate::supervise::startup::{SETTLED_TICKS, TEST_TICKS, UNLOADED, at_rest, silent, stowed};
-use crate::supervise::{Mode, Trigger, next};
-use crate::units::{Direction, Q16};
+use crate::supervise::{Mode, ServiceDuties, Trigger, next};
+use crate::units::{Direction, Duty, MotorCommand, Q16};
 
 /// Ticks for which a preload must be reached before the drive starts.
 const STANDING_TICKS: u32 = 60;
@@ -17,6 +19,15 @@ const REST_TICKS: u32 = 2000;
 const ZERO_TICKS: u32 = 2000;
 /// Ticks within which the wheel must be at rest after a stop.
 const STOP_TICKS: u32 = 1500;
+
+/// What the bounds of the service mode look at.
+const fn view(sensed: &SensedState) -> ServiceView {
+    ServiceView {
+        travel: sensed.travel,
+        preload: sensed.preload_filtered,
+        compression: sensed.compression_filtered,
+    }
+}
 
 impl Controller {
     /// Applies the transition that the stage asks for, and what follows from it.
@@ -59,7 +70,7 @@ impl Controller {
         if on_corner {
             // The drive has been off: without the corner's full feed-forward the wheel would roll
             // off before the speed loop reacts.
-            state.blend_at_once();
+            state.corner_blend_ticks = BLEND_TICKS;
         }
         self.take_findings(state, tick, found);
     }
@@ -126,6 +137,37 @@ impl Controller {
         } else if state.in_mode >= self.preload_timeout {
             tick.fail(Fault::PreloadNotReached);
         }
+    }
+
+    /// Takes a request of the host. Asking for rest enters the mode from idle; in any other mode
+    /// it is logged and changes nothing.
+    pub(super) fn take_duties(
+        &self,
+        state: &mut State,
+        tick: &mut Pass<'_>,
+        request: ServiceDuties,
+    ) {
+        if state.service.ask(request) {
+            tick.log(Event::Service(request));
+        }
+        if state.mode == Mode::Idle && request.is_rest() {
+            tick.trigger(Trigger::Service);
+        }
+    }
+
+    /// Commands of drive and pre-tightener in the service mode.
+    pub(super) fn serve(
+        &self,
+        state: &mut State,
+        tick: &mut Pass<'_>,
+    ) -> (MotorCommand, MotorCommand) {
+        let (duties, limit) = state.service.step(&view(tick.sensed));
+        if let Some(limit) = limit {
+            tick.log(Event::Limit(limit));
+        }
+        // A bridge without a duty stays off, unless it brakes.
+        let command = |duty, brakes| MotorCommand { duty, enable: brakes || duty != Duty::ZERO };
+        (command(duties.drive, state.service.brakes()), command(duties.pretightener, false))
     }
 
     /// The end of travel, confirmed by the arm.

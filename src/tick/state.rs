@@ -19,7 +19,7 @@ use crate::units::{
 const CLOSES: Q16 = q16(20_000_000);
 const MOST_BEHIND: Millimetres = q16(250_000); // Farther off, its place has been corrected.
 /// Ticks over which the feed-forward of a detected corner is blended in.
-const BLEND_TICKS: u8 = 32;
+pub(super) const BLEND_TICKS: u8 = 32;
 
 /// State of the controller.
 #[derive(Clone, Debug, Default)]
@@ -147,11 +147,6 @@ impl State {
         (blend, (blend - before).max(Q16::ZERO))
     }
 
-    /// The feed-forward of a corner applies in full from now on.
-    pub(super) fn blend_at_once(&mut self) {
-        self.corner_blend_ticks = BLEND_TICKS;
-    }
-
     pub(super) fn leg(&self, approaching: bool) -> Leg {
         match self.estimate.contact() {
             Contact::Both | Contact::Corner => Leg::Crossing,
@@ -201,7 +196,7 @@ mod tests {
         assert_eq!(parts[39], q16(1_000_000));
         let mut state = State::default();
         state.estimate.watch.contact = Contact::Corner;
-        state.blend_at_once();
+        state.corner_blend_ticks = BLEND_TICKS;
         assert_eq!(state.blend_corner(), (q16(1_000_000), Q16::ZERO));
         state.estimate.watch.contact = Contact::Wall;
         assert_eq!(state.blend_corner(), (q16(968_750), Q16::ZERO));

@@ -22,12 +22,12 @@ fn stiff() -> Controller {
 #[test]
 fn on_a_steep_corner_the_spring_limits_the_speed() {
     let controller = stiff();
-    let limited = controller.followed(q16(20_000_000), q16(600_000));
+    let limited = controller.follow(q16(20_000_000), q16(600_000));
     assert!((limited - q16(10_000_000)).abs() < q16(1_000), "{limited}");
-    assert_eq!(controller.followed(q16(8_000_000), q16(600_000)), q16(8_000_000));
+    assert_eq!(controller.follow(q16(8_000_000), q16(600_000)), q16(8_000_000));
     // Level wall, and down behind the edge.
-    assert_eq!(controller.followed(q16(20_000_000), Q16::ZERO), q16(20_000_000));
-    assert_eq!(controller.followed(q16(20_000_000), q16(-600_000)), q16(20_000_000));
+    assert_eq!(controller.follow(q16(20_000_000), Q16::ZERO), q16(20_000_000));
+    assert_eq!(controller.follow(q16(20_000_000), q16(-600_000)), q16(20_000_000));
 }
 
 proptest! {
@@ -38,7 +38,7 @@ proptest! {
     ) {
         let controller = stiff();
         let (speed, slope) = (Q16::from_bits(speed), Q16::from_bits(slope));
-        let followed = controller.followed(speed, slope);
+        let followed = controller.follow(speed, slope);
         prop_assert!(followed >= Q16::ZERO && followed <= speed);
         if slope > LEVEL_SLOPE {
             prop_assert!(followed * slope <= controller.climb_speed + Q16::DELTA);
@@ -132,7 +132,7 @@ fn only_on_a_corner_the_climb_limits_the_speed() {
         state.estimate.watch.contact = contact;
         // Eight millimetres before the face at 18 mm.
         state.estimate.position = Q16::from_num(10);
-        stiff().limit_climb(&state, fast)
+        stiff().climb(&state, fast)
     };
     assert_eq!(limited(Contact::Wall), fast);
     assert!(limited(Contact::Both) < q16(30_000_000));

@@ -16,18 +16,12 @@ impl Direction {
 
     /// +1 outwards, -1 back.
     pub const fn sign(self) -> i32 {
-        match self {
-            Self::Deploy => 1,
-            Self::Retract => -1,
-        }
+        if matches!(self, Self::Deploy) { 1 } else { -1 }
     }
 
     /// The other one.
     pub const fn opposite(self) -> Self {
-        match self {
-            Self::Deploy => Self::Retract,
-            Self::Retract => Self::Deploy,
-        }
+        if matches!(self, Self::Deploy) { Self::Retract } else { Self::Deploy }
     }
 }
 

@@ -67,6 +67,7 @@ impl Planner {
         let range = rig.control.adaptation_range;
         let scale = |to| checked("control.adaptation_range", to);
         let answers = 1.0 + PROPORTIONAL;
+        let lag_per_n = rig.drive.no_load_speed_mm_s / rig.drive.stall_force_n / answers;
         Ok(Self {
             tread,
             shear,
@@ -74,10 +75,7 @@ impl Planner {
             timing: Timing::try_build(rig)?,
             drive: DriveModel {
                 decay: checked("drive.no_load_speed_mm_s", 1e-3 * CROSSOVER_RAD_S / answers)?,
-                lag_per_load: checked(
-                    "drive.stall_force_n",
-                    rig.drive.no_load_speed_mm_s / rig.drive.stall_force_n / answers,
-                )?,
+                lag_per_load: checked("drive.stall_force_n", lag_per_n)?,
             },
             pretightener: PretightenerModel {
                 settles: checked("preload.delay_s", rig.preload.delay_s + rig.preload.lag_s)?,
@@ -127,19 +125,10 @@ fn steady_gap(
     force: Newtons,
 ) -> Millimetres {
     let reach = tread.radius() * STEADY_REACH;
-    let (from, until) = match direction {
-        Direction::Deploy => (-reach, Q16::ZERO),
-        Direction::Retract => (reach.half(), -reach),
-    };
-    let run = Run {
-        direction,
-        axial: Axial::Driven(load),
-        scale: Q16::ONE,
-        level: false,
-        shear: Some(shear),
-        from,
-        until,
-    };
+    let deploys = direction == Direction::Deploy;
+    let (from, until) = if deploys { (-reach, Q16::ZERO) } else { (reach.half(), -reach) };
+    let (axial, scale, shear) = (Axial::Driven(load), Q16::ONE, Some(shear));
+    let run = Run { direction, axial, scale, level: false, shear, from, until };
     roll(tread, &mut TreadState::default(), &run, |_| (speed, force)).lift.gap
 }
 

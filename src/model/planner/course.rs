@@ -95,20 +95,10 @@ impl Planner {
         let braking = self.timing.brake_distance(scene.cruise, approach.window_speed);
         let looks = approach.window_from + braking;
         let sense = if forward { Q16::ONE } else { -Q16::ONE };
-        let touches = match scene.direction {
-            Direction::Deploy => self.touch_at,
-            Direction::Retract => Q16::ZERO,
-        };
+        let touches = if forward { self.touch_at } else { Q16::ZERO };
         let mut from = touches + self.radius * ROLL_IN;
-        let mut drive = Drive {
-            direction: scene.direction,
-            axial: Axial::Driven(scene.load),
-            pressed: Q16::ZERO,
-            duration: Q16::ZERO,
-            gives: Q16::ZERO,
-            scale: scene.scale,
-            level: false,
-        };
+        let (direction, axial) = (scene.direction, Axial::Driven(scene.load));
+        let mut drive = Drive { direction, axial, scale: scene.scale, ..Drive::default() };
         // A wheel that is close and not at cruise speed goes on from where it then is; one at rest
         // has no tread to roll in.
         let goes_on = scene.distance - scene.speed * ticks_to_seconds(PLAN_TICKS);

@@ -56,15 +56,8 @@ impl Planner {
         let first = review.history.strides().next().unwrap_or_default();
         let full = review.history.strides().count() == STRIDES;
         let roll_in = if full { ROLL_IN } else { 0 };
-        let mut drive = Drive {
-            direction: review.direction,
-            axial: Axial::Driven(load),
-            pressed: first.pressed(),
-            duration: Q16::ZERO,
-            gives: Q16::ZERO,
-            scale,
-            level: false,
-        };
+        let (direction, axial, pressed) = (review.direction, Axial::Driven(load), first.pressed());
+        let mut drive = Drive { direction, axial, pressed, scale, ..Drive::default() };
         let before = self.tread.stride() * Q16::from_num(roll_in as i32);
         let before = if review.direction == Direction::Deploy { -before } else { before };
         self.tread.put_down(state, from + before, &drive);

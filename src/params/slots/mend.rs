@@ -3,7 +3,7 @@
 //! The chip's error correction reports such double words whenever they are read, and once the
 //! drive runs it then cuts the bridges.
 
-use super::{Damaged, Draft, PAGE_BYTES, Refusal, SLOT_BYTES, SetMemory, Slot, WORD_BYTES, stored};
+use super::{Draft, PAGE_BYTES, Refusal, SLOT_BYTES, SetMemory, Slot, WORD_BYTES, stored};
 
 /// Erases what cannot be read. A set in force that is intact, though a part of its slot is not,
 /// is saved again first, in the other slot. A damaged set in force stays as it is: the start
@@ -12,11 +12,8 @@ use super::{Damaged, Draft, PAGE_BYTES, Refusal, SLOT_BYTES, SetMemory, Slot, WO
 /// # Errors
 /// [`Refusal`] if the set cannot be saved again, or the flash failed.
 pub async fn mend(memory: &mut impl SetMemory) -> Result<(), Refusal> {
-    let in_force = match stored(memory) {
-        Ok(found) => found.map(|stored| (stored.slot, stored.set.len())),
-        Err(Damaged(_)) => return Ok(()),
-    };
-    if let Some((slot, length)) = in_force
+    let Ok(in_force) = stored(memory) else { return Ok(()) };
+    if let Some((slot, length)) = in_force.map(|stored| (stored.slot, stored.set.len()))
         && !memory.is_readable(slot)
     {
         let end = super::PREFIX + length;
