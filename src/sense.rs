@@ -1,6 +1,5 @@
-//! From raw codes to checked quantities, each with its time and [`Validity`]. A sensor that
-//! falls silent or answers with errors keeps its last good value, which ages; it never delays
-//! the tick.
+//! From raw codes to checked quantities, each with its time and [`Validity`]. A sensor that falls
+//! silent or answers with errors keeps its last good value, which ages; it never delays the tick.
 //!
 //! # A new sensor
 //! Task, log, columns, messages of the loop, faults of a scenario and images follow from its entry

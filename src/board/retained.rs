@@ -16,9 +16,8 @@ struct Kept {
 
 struct Shared(UnsafeCell<MaybeUninit<Kept>>);
 
-// SAFETY: written by the control tick, and by handlers that never return, on one core; read
-// before the tick begins. Torn or unwritten words are plain integers, and the record's check
-// rejects them.
+// SAFETY: written by the control tick, and by handlers that never return, on one core; read before
+// the tick begins. Torn or unwritten words are plain integers, and the record's check rejects them.
 unsafe impl Sync for Shared {}
 
 /// A probe finds it by this name.

@@ -91,9 +91,8 @@ impl PreloadLoop {
         })
     }
 
-    /// One tick towards `target` at `measured`, both N. `drift` is the rate at which
-    /// the wheel's own motion will change the spring's force when this tick's duty
-    /// takes effect, N/s.
+    /// One tick towards `target` at `measured`, both N. `drift` is the rate at which the wheel's
+    /// own motion will change the spring's force when this tick's duty takes effect, N/s.
     pub fn step(
         &self,
         state: &mut PreloadLoopState,

@@ -1,5 +1,4 @@
-//! Rise of the wheel over a corner, which compresses the spring, and the drive force that it
-//! takes.
+//! Rise of the wheel over a corner, which compresses the spring, and the drive force that it takes.
 
 use crate::numeric::{checked, divide, sqrt};
 use crate::rig::{Rig, RigError};
@@ -11,19 +10,17 @@ const CORNER_PART: f64 = 0.28;
 /// Tread depth on the continuous wall, likewise.
 const WALL_PART: f64 = 0.08;
 
-/// Motor force over radial force times the corner's inclination: part of the radial
-/// force comes from traction itself, `1/(cos + u sin)` against `1/cos` at the
-/// utilisation of a crossing.
+/// Motor force over radial force times the corner's inclination: part of the radial force comes
+/// from traction itself, `1/(cos + u sin)` against `1/cos` at the utilisation of a crossing.
 const DRIVE_SLOPE_PART: Ratio = q16(850_000);
 
 /// Travel from touch-down until the corner is free, over that from touch to lift-off.
 const BACK_PART: f64 = 0.3;
 
-/// Rise of the centre per axial travel over the distance to the face, dimensionless: on the
-/// corner a circle of radius R - c rolls about a point, `dy/dx = d / sqrt((R-c)^2 - d^2)`; the
-/// tread recovers from its depth at the corner to that on the wall, as a triangle that ends
-/// half a patch behind the edge; from the first touch it runs in with the square of the
-/// distance.
+/// Rise of the centre per axial travel over the distance to the face, dimensionless: on the corner
+/// a circle of radius R - c rolls about a point, `dy/dx = d / sqrt((R-c)^2 - d^2)`; the tread
+/// recovers from its depth at the corner to that on the wall, as a triangle that ends half a patch
+/// behind the edge; from the first touch it runs in with the square of the distance.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct CornerProfile {
     /// Distance of the centre from an edge that carries, mm.

@@ -77,8 +77,7 @@ struct PretightenerModel {
     rate: NewtonsPerSecond,
 }
 
-/// The model side of the schedule; runs outside the tick. The default is a place to read one
-/// into.
+/// The model side of the schedule; runs outside the tick. The default is a place to read one into.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Planner {
     tread: Tread,

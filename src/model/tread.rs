@@ -1,10 +1,9 @@
 //! The tread, rolled out: a viscoelastic ring over a step, in fixed point.
 //!
-//! Elements lie along rays from the wheel's centre, 0.008 rad apart. A stride rolls the
-//! tread on by one of them. An element at depth d carries the pressure of the three-parameter
-//! solid (`relaxation`), never a tension; the centre is where the contact carries what presses
-//! the wheel. Only elements in contact are visited; those that leave it are fresh when they
-//! return.
+//! Elements lie along rays from the wheel's centre, 0.008 rad apart. A stride rolls the tread on by
+//! one of them. An element at depth d carries the pressure of the three-parameter solid
+//! (`relaxation`), never a tension; the centre is where the contact carries what presses the wheel.
+//! Only elements in contact are visited; those that leave it are fresh when they return.
 //!
 //! Equations, with c and s the sums of `p cos` and `p sin` over the contact: pushed `c = N`; driven
 //! by torque against an axial load G `c + u s = N` with the utilisation `u = (G + s) / c`. One

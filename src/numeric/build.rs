@@ -1,5 +1,4 @@
-//! From SI numbers to machine units: the only floats of this module, used once
-//! at start.
+//! From SI numbers to machine units: the only floats of this module, used once at start.
 
 use super::{Divisor, LowPass};
 use crate::rig::RigError;

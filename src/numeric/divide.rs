@@ -5,9 +5,8 @@ use crate::units::Q16;
 
 /// Quotient `a / b`, rounded to nearest, halves away from zero.
 ///
-/// Range: all of [`Q16`]; what exceeds it saturates, so does division by zero, towards the sign
-/// of `a` (0 / 0 is 0). Error: 0.5 LSB. Source: schoolbook division in base 2^16, Knuth, TAOCP
-/// 2,
+/// Range: all of [`Q16`]; what exceeds it saturates, so does division by zero, towards the sign of
+/// `a` (0 / 0 is 0). Error: 0.5 LSB. Source: schoolbook division in base 2^16, Knuth, TAOCP 2,
 /// 4.3.1, algorithm D.
 pub fn divide(a: Q16, b: Q16) -> Q16 {
     let (a, b) = (a.to_bits(), b.to_bits());

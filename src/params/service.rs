@@ -102,8 +102,7 @@ pub struct Service<M> {
 }
 
 impl<M: SetMemory> Service<M> {
-    /// A service over this flash, with the set of the image and the hash of the running
-    /// parameters.
+    /// A service over this flash, with the set of the image and the hash of the running parameters.
     pub const fn new(memory: M, image: &'static [u8], running: u32) -> Self {
         Self { memory, image, running, draft: None }
     }

@@ -1,9 +1,8 @@
 //! Two slots in flash for a parameter set, so that one of them always holds an intact one.
 //!
-//! A set is written into the slot that is not in force. It comes into force with its header,
-//! the last double word written. Power may fail at any moment: before the header the old set is
-//! in force, after it the new one; a half-written header counts only if the set behind it is
-//! intact.
+//! A set is written into the slot that is not in force. It comes into force with its header, the
+//! last double word written. Power may fail at any moment: before the header the old set is in
+//! force, after it the new one; a half-written header counts only if the set behind it is intact.
 //!
 //! ```text
 //! 0   header: magic, sequence number     (written last)

@@ -16,10 +16,9 @@ const ENTRY_WORDS: usize = 2;
 
 /// A checksum of an image so far, continued by some of its words.
 ///
-/// Each word is mixed in by steps of which every one can be undone, so that a change within
-/// one word always shows. So does any pair of bits of a double word, the least that the
-/// chip's own correction leaves; all else with all but one in 2^32 or so. It costs half of
-/// what a CRC does.
+/// Each word is mixed in by steps of which every one can be undone, so that a change within one
+/// word always shows. So does any pair of bits of a double word, the least that the chip's own
+/// correction leaves; all else with all but one in 2^32 or so. It costs half of what a CRC does.
 pub fn sum_on(sum: u32, words: &[u32]) -> u32 {
     words.iter().fold(sum, |sum, word| (sum ^ sum >> 15 ^ word).wrapping_mul(0x9E37_79B1))
 }

@@ -193,8 +193,7 @@ mod tests {
         meter.step(state, now, sample(position, now), Default::default(), LIMIT)
     }
 
-    /// Runs at constant speed and gives the mean relative error and the largest,
-    /// after settling.
+    /// Runs at constant speed and gives the mean relative error and the largest, after settling.
     fn steady(meter: &Speedometer, speed_mm_s: f64) -> (f64, f64) {
         let mut state = SpeedState::default();
         let (mut sum, mut worst) = (0.0_f64, 0.0_f64);

@@ -30,10 +30,9 @@ pub const BAND: i32 = 655;
 /// and reference together, 0.7 % each.
 pub const BAND_SHIFT: u32 = 5;
 /// Least output of a bridge that regulates its current and whose motor does not turn against its
-/// duty, Q15 duty: a quarter. At standstill the
-/// presets' force limit takes half of the full duty, more in motion; the other half is for the
-/// spread of limit and winding, and for a wheel that is braked. A smaller duty never reaches the
-/// limit and is judged by itself.
+/// duty, Q15 duty: a quarter. At standstill the presets' force limit takes half of the full duty,
+/// more in motion; the other half is for the spread of limit and winding, and for a wheel that is
+/// braked. A smaller duty never reaches the limit and is judged by itself.
 const REGULATED: i16 = 8192;
 /// Ticks for which the output must be off.
 pub const OFF_TICKS: i8 = 4;

@@ -90,9 +90,8 @@ impl Exchange {
 
     /// Wakes the sensors that are due in this tick, and the control tick.
     ///
-    /// The executor runs tasks woken together from the last to the first: the sensors in the
-    /// order of [`SensorId`], then the control tick, which so finds the codes of its own
-    /// millisecond.
+    /// The executor runs tasks woken together from the last to the first: the sensors in the order
+    /// of [`SensorId`], then the control tick, which so finds the codes of its own millisecond.
     pub(super) fn start_tick(&self, tick: Tick) {
         self.liveness.start(tick);
         self.tick_started.signal(());
