@@ -141,16 +141,11 @@ impl Controller {
 
     /// Takes a request of the host. Asking for rest enters the mode from idle; in any other mode
     /// it is logged and changes nothing.
-    pub(super) fn take_duties(
-        &self,
-        state: &mut State,
-        tick: &mut Pass<'_>,
-        request: ServiceDuties,
-    ) {
-        if state.service.ask(request) {
-            tick.log(Event::Service(request));
+    pub(super) fn take_duties(&self, state: &mut State, tick: &mut Pass<'_>, asked: ServiceDuties) {
+        if state.service.ask(asked) {
+            tick.log(Event::Service(asked));
         }
-        if state.mode == Mode::Idle && request.is_rest() {
+        if state.mode == Mode::Idle && asked.is_rest() {
             tick.trigger(Trigger::Service);
         }
     }

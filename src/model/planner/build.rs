@@ -37,13 +37,11 @@ impl Planner {
         let tread = Tread::try_build(rig)?;
         let load = rig.plant.top_load_n * rig.plant.top_load_share;
         let tangents = (0..rig.rig.step_positions_mm.len()).map(|level| {
-            let sine =
-                (rig.centre_radius_mm(level) - rig.rig.arm_pivot_radius_mm) / rig.rig.arm_length_mm;
-            sine / libm::sqrt(1.0 - sine * sine)
+            let lever = rig.centre_radius_mm(level) - rig.rig.arm_pivot_radius_mm;
+            let sine = lever / rig.rig.arm_length_mm;
+            checked("rig.arm_length_mm", sine / libm::sqrt(1.0 - sine * sine))
         });
-        let tangents = tangents
-            .map(|tangent| checked("rig.arm_length_mm", tangent))
-            .collect::<Result<heapless::Vec<_, MAX_STEPS>, _>>()?;
+        let tangents = tangents.collect::<Result<heapless::Vec<_, MAX_STEPS>, _>>()?;
         let first = tangents.first().map_or(0.0, |tangent: &Ratio| tangent.to_num::<f64>());
         let first = rig.plant.arm_coupling * load * first;
         let load_n = checked("plant.top_load_n", load)?;
