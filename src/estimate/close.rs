@@ -78,7 +78,7 @@ impl Estimator {
             }
             Direction::Retract => {
                 let beyond = self.distance(state).is_some_and(|ahead| ahead <= Q16::ZERO);
-                (state.next_step, beyond, rise)
+                (state.next_step, beyond && !state.known.is_searching(), rise)
             }
         };
         if beyond && state.over.0 != step {
@@ -120,7 +120,9 @@ impl Estimator {
                 });
                 let landing = landing.or(known);
                 let shift = landing.map_or(measured.shift, |landing| landing.face - point.face);
-                let missed = missed(state, open.step, higher);
+                // Retracting, it was over the edge where the table has that.
+                let elsewhere = retracts && (point.residual + shift).abs() > self.steps.tolerance;
+                let missed = missed(state, open.step, higher).filter(|_| !elsewhere);
                 let misread = point.leverage * missed.unwrap_or(Ratio::ZERO);
                 let shift = if retracts { shift } else { shift - misread };
                 if state.known.is_searching() && open.step > 0 {
@@ -150,7 +152,8 @@ impl Estimator {
                 if let Some(climb) = open.climb.filter(|climb| climb.leverage > Q16::ZERO) {
                     let leverage = climb.leverage + point.leverage;
                     let sigma = leverage * missed.unwrap_or(Ratio::ZERO).abs() * PART_SIGMA;
-                    state.odometry.climb(state.position, &climb.since, climb.moved, sigma);
+                    let moved = climb.moved + higher * climb.slope - measured.shift;
+                    state.odometry.climb(state.position, &climb.since, moved, sigma);
                 }
                 if let Some(landing) = landing.filter(|landing| landing.slid > Q16::ZERO) {
                     state.odometry.slip(Q16::ZERO, landing.sigma());
@@ -175,7 +178,7 @@ impl Estimator {
         open.gap = measured.gap;
         open.height = measured.height;
         open.deepest = state.watch.deepest;
-        found.slip = slip_of(&open, open.lift.map_or(state.position, |point| point.face));
+        found.slip = open.slipped(open.lift.map_or(state.position, |point| point.face));
         // Of a crossing that began in its middle the wall below was not measured.
         if higher.abs() > HEIGHT_SEEN && !open.resumed {
             found.limit(Limit::StepHeight);
@@ -221,11 +224,13 @@ pub(super) struct Measured {
     pub(super) plausible: bool,
 }
 
-/// Slip of a crossing so far, if any.
-pub(super) fn slip_of(open: &OpenCrossing, position: Millimetres) -> Option<Slip> {
-    let amount = open.slip.lost + open.slip.beside;
-    let sigma = open.landing.map_or(open.slip.sigma(), |landing| landing.sigma());
-    (amount > Q16::ZERO).then_some(Slip { position, amount, sigma })
+impl OpenCrossing {
+    /// Slip so far, of a wheel that is here, if it is more than its sigma.
+    pub(crate) fn slipped(&self, position: Millimetres) -> Option<Slip> {
+        let amount = self.slip.lost + self.slip.beside;
+        let sigma = self.landing.map_or(self.slip.sigma(), |landing| landing.sigma());
+        (amount > sigma).then_some(Slip { position, amount, sigma })
+    }
 }
 
 /// Reports a step outside its window, unless it has been reported already.

@@ -1,6 +1,6 @@
 //! Follows a crossing: what the watch detects becomes odometry, level and review.
 
-use super::close::{Measured, slip_of};
+use super::close::Measured;
 use super::crossing::{Contact, CrossingEvent, Lift, WatchInput};
 use super::landing::OnEdge;
 use super::odometry::Rolling;
@@ -10,6 +10,7 @@ use super::wind_up::Pulled;
 use super::{EstimateState, Estimator, Expectation, Findings, LiftPoint, OpenCrossing, Position};
 use crate::fault::{Fault, Limit};
 use crate::model::LimitedBy;
+use crate::numeric::divide;
 use crate::sense::{FILTER_LAG, SensedState};
 use crate::units::{Direction, Millimetres, Newtons, Q16, Ratio, Tick, q16};
 
@@ -302,7 +303,7 @@ impl Estimator {
             || hopeless && tick.now.wrapping_sub(since) > HOPELESS_TICKS
         {
             found.fault = Some(Fault::WheelSlips);
-            found.slip = slip_of(open, state.position);
+            found.slip = open.slipped(state.position);
         }
     }
 
@@ -350,7 +351,9 @@ impl Estimator {
                     state.odometry.slip(moved, Q16::ZERO);
                 } else {
                     let leverage = self.watch.leverage(seen.compression, ahead);
-                    climb = Climb { moved, leverage, since: state.odometry.since(state.position) };
+                    let slope = divide(self.watch.radius - fall, ahead.max(Millimetres::ONE));
+                    let since = state.odometry.since(state.position);
+                    climb = Climb { moved, leverage, slope, since };
                 }
                 open.climb = Some(climb);
                 state.begin_tick(sensed.travel);

@@ -152,6 +152,8 @@ pub struct Climb {
     pub moved: Millimetres,
     /// As [`LiftPoint::leverage`].
     pub leverage: Millimetres,
+    /// By how much it lies further out per height of the step.
+    pub slope: Ratio,
     /// What shifted the position since then.
     pub since: [Ratio; 4],
 }

@@ -147,7 +147,10 @@ impl Shear {
         let creeps = divide(pulls * renewed, self.relaxation_lengths * rolling * carter);
         let winds = displaced - state.displaced;
         (state.displaced, state.memory) = (displaced, follows * displaced + kept);
-        state.floor = follows * pull.floor + state.floor * keeps;
+        // Of the floor, by its own patch.
+        let passes = divide(pull.rolled, (pull.patch * CONTACT).max(pull.rolled));
+        let floor = relaxes * pull.floor + state.floor;
+        state.floor = divide(floor, Ratio::ONE + relaxes + passes);
         [creeps, winds]
     }
 

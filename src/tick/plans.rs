@@ -138,7 +138,7 @@ fn record(tick: &mut Pass<'_>, open: &OpenCrossing, outcome: &Outcome) {
         gap_predicted: outcome.gap_predicted,
         gap_measured: open.gap,
         height: open.height,
-        slip: open.slip.lost + open.slip.beside,
+        slip: open.slipped(Q16::ZERO).map_or(Q16::ZERO, |slip| slip.amount),
         lead_time: lead_time(open, point.at),
         slip_margin: outcome.slip_margin,
         stiffness_scale: outcome.learned.scale,
