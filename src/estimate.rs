@@ -1,8 +1,6 @@
 //! From readings to the state of motion and contact: where the wheel is on its travel, which
 //! steps are behind it, and what carries it.
 
-#![deny(clippy::float_arithmetic)]
-
 mod close;
 pub mod crossing;
 mod follow;

@@ -70,18 +70,20 @@ impl Estimator {
     pub(super) fn read_over_edge(&self, state: &mut EstimateState, sensed: &SensedState) {
         let seen = self.watch_input(state, sensed);
         let rise = self.watch.rise(&state.watch, state.direction, &seen);
-        let (step, beyond, fallen) = match state.direction {
+        let (step, past, fallen) = match state.direction {
             Direction::Deploy => {
                 let Some(open) = state.crossing.as_ref() else { return };
-                let beyond = open.lift.is_some_and(|lift| state.position >= lift.face);
-                (open.step, beyond, self.steps.height - rise)
+                let past = open.lift.map(|lift| state.position - lift.face);
+                (open.step, past, self.steps.height - rise)
             }
             Direction::Retract => {
-                let beyond = self.distance(state).is_some_and(|ahead| ahead <= Q16::ZERO);
-                (state.next_step, beyond && !state.known.is_searching(), rise)
+                let past = self.distance(state).filter(|_| !state.known.is_searching());
+                (state.next_step, past.map(|ahead| -ahead), rise)
             }
         };
-        if beyond && state.over.0 != step {
+        // Farther on the distance would count.
+        let over = past.is_some_and(|past| past >= Q16::ZERO && past < Millimetres::ONE);
+        if over && state.over.0 != step {
             state.over = (step, [fallen + seen.compression, seen.compression]);
         }
     }
@@ -90,6 +92,15 @@ impl Estimator {
     pub(super) fn as_table(&self, gap_as_table: Millimetres) -> Measured {
         let (height, shift) = (self.steps.height, Q16::ZERO);
         Measured { height, gap: gap_as_table, gap_as_table, shift, plausible: false }
+    }
+
+    /// Ends a crossing that is past its lift-off, at the end of travel.
+    pub fn close_crossing(&self, state: &mut EstimateState, sensed: &SensedState) -> Findings {
+        let mut found = Findings::default();
+        if let Some(point) = state.crossing.as_ref().and_then(|open| open.lift) {
+            self.close(state, sensed, &self.as_table(point.gap_as_table), &mut found);
+        }
+        found
     }
 
     /// The crossing is behind: its step corrects the position, and it is reported for review,

@@ -6,8 +6,6 @@
 //! the tread's memory keeps of its compression. Then the compression c, the corner's depth,
 //! gives the gap without odometry: `gap = sqrt((R-c)^2 + y^2 - (y-h)^2) - R`.
 
-#![deny(clippy::float_arithmetic)]
-
 #[allow(clippy::float_arithmetic, reason = "SI to machine units, once at start")]
 mod build;
 mod measure;

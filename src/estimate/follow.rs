@@ -96,8 +96,8 @@ impl Estimator {
         self.read_over_edge(state, tick.sensed);
         if state.watch.contact == Contact::Wall || state.known.is_searching() {
             let (travel, speed) = state.turns(tick.sensed);
-            let (duty, pressed) = (tick.duty, tick.pressed);
-            let compression = tick.sensed.compression_filtered;
+            let Follow { duty, pressed, sensed, .. } = *tick;
+            let compression = sensed.compression_filtered;
             let rolls = Rolls { direction, travel, speed, duty, pressed, compression };
             let shown = self.tread.roll(&mut state.tread, &rolls);
             let unlike = |shown: &Shown| (shown.rolled - Ratio::ONE).abs();
@@ -205,15 +205,6 @@ impl Estimator {
                     found.fault = Some(Fault::StepsLost);
                 }
             }
-        }
-        found
-    }
-
-    /// Ends a crossing that is past its lift-off, at the end of travel.
-    pub fn close_crossing(&self, state: &mut EstimateState, sensed: &SensedState) -> Findings {
-        let mut found = Findings::default();
-        if let Some(point) = state.crossing.as_ref().and_then(|open| open.lift) {
-            self.close(state, sensed, &self.as_table(point.gap_as_table), &mut found);
         }
         found
     }
@@ -500,5 +491,4 @@ fn position_of_radius(state: &EstimateState, sensed: &SensedState) -> Millimetre
 
 #[cfg(test)]
 #[path = "follow_tests.rs"]
-#[allow(clippy::float_arithmetic, reason = "quantities of a test")]
 mod tests;

@@ -6,8 +6,6 @@
 //! wall carries, because the wheel no longer falls. There the compression falls, too, which must
 //! not look like a slide: where the wheel landed is found with the largest compression so far.
 
-#![deny(clippy::float_arithmetic)]
-
 use crate::numeric::{divide, sqrt};
 use crate::units::{Millimetres, Q16, Ratio, Travel, q16};
 
@@ -188,7 +186,6 @@ impl Slide {
 }
 
 #[cfg(test)]
-#[allow(clippy::float_arithmetic, reason = "the reference is in f64")]
 mod tests {
     use super::*;
     use proptest::prelude::*;

@@ -2,8 +2,6 @@
 //! every recognised step. What the steps show of the wheel's rolling radius corrects the travel
 //! after them, within the run: the next one finds the same steps again, which are no news.
 
-#![deny(clippy::float_arithmetic)]
-
 use crate::numeric::{between, divide, sqrt};
 use crate::units::{Direction, Millimetres, Q16, Ratio, Travel, q16};
 
@@ -337,6 +335,5 @@ impl Odometry {
 }
 
 #[cfg(test)]
-#[allow(clippy::float_arithmetic, reason = "the reference is in f64")]
 #[path = "odometry_tests.rs"]
 mod tests;

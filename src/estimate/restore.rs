@@ -206,5 +206,4 @@ const fn error_of(sure: bool) -> Millimetres {
 
 #[cfg(test)]
 #[path = "restore_tests.rs"]
-#[allow(clippy::float_arithmetic, reason = "quantities of a test")]
 pub(super) mod tests;

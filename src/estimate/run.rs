@@ -171,7 +171,6 @@ impl Estimator {
 }
 
 #[cfg(test)]
-#[allow(clippy::float_arithmetic, reason = "quantities of a test")]
 mod tests {
     use super::super::restore::tests::{estimator, sensed};
     use super::*;

@@ -7,8 +7,6 @@
 //! cumulative sum (Page 1954) with their motion as its reference and the noise of the arm's code as its
 //! threshold.
 
-#![deny(clippy::float_arithmetic)]
-
 use super::crossing::HEIGHT_MOST;
 use super::landing::OnEdge;
 use crate::numeric::{divide, sqrt};
@@ -139,7 +137,6 @@ impl CornerSlip {
 }
 
 #[cfg(test)]
-#[allow(clippy::float_arithmetic, reason = "the reference is in f64")]
 mod tests {
     use super::*;
     use proptest::prelude::*;

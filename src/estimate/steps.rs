@@ -1,7 +1,5 @@
 //! The step table: where the wheel is relative to the steps and the end of travel.
 
-#![deny(clippy::float_arithmetic)]
-
 use crate::model::corner_profile::CornerProfile;
 use crate::numeric::checked;
 use crate::rig::{MAX_STEPS, Rig, RigError};
@@ -217,7 +215,6 @@ impl Steps {
 }
 
 #[cfg(test)]
-#[allow(clippy::float_arithmetic, reason = "quantities of a test")]
 mod tests {
     use super::*;
 

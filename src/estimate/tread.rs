@@ -9,8 +9,6 @@
 //! a tread is stiffer than known at rest under a low preload, and softer while it rolls under a
 //! higher one. The ratio of both does not depend on the sensors' gains.
 
-#![deny(clippy::float_arithmetic)]
-
 use crate::model::corner_profile::CornerProfile;
 use crate::model::planner::KNOWN_SCALE;
 use crate::numeric::{LowPass, LowPassState, checked, divide, sqrt};
@@ -394,5 +392,4 @@ impl Tread {
 
 #[cfg(test)]
 #[path = "tread_tests.rs"]
-#[allow(clippy::float_arithmetic, reason = "the reference is in f64")]
 mod tests;

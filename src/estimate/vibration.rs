@@ -1,8 +1,6 @@
 //! Vibration of the arm: an observer of its mode in the tread's compression, which swings with
 //! it by 7 um per newton; the sensor's noise is 2 um.
 
-#![deny(clippy::float_arithmetic)]
-
 use crate::numeric::cosine_of_turns;
 use crate::rig::{Rig, RigError};
 use crate::units::{Millimetres, Q16, TICK_HZ};
@@ -184,7 +182,6 @@ fn length(a: i32, b: i32) -> i32 {
 }
 
 #[cfg(test)]
-#[allow(clippy::float_arithmetic, reason = "the reference is in f64")]
 mod tests {
     use super::*;
     use proptest::prelude::*;

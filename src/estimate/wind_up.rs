@@ -1,8 +1,6 @@
 //! What a tread is pulled by, as the sensors have it, and the travel that it takes: the rim gives
 //! way against the hub ([`model::wind_up`](crate::model::wind_up)).
 
-#![deny(clippy::float_arithmetic)]
-
 use super::odometry::Odometry;
 use crate::model::wind_up::{CONTACT, Pull, Shear, Spread, Winding};
 use crate::numeric::{between, checked, divide, sqrt};
@@ -216,7 +214,6 @@ impl WindUp {
 }
 
 #[cfg(test)]
-#[allow(clippy::float_arithmetic, reason = "the reference is in f64")]
 mod tests {
     use super::*;
     use proptest::prelude::*;

@@ -1,7 +1,5 @@
 //! What a crossing measures: flat ground, the compression of a wheel that falls, and the gap.
 
-#![deny(clippy::float_arithmetic)]
-
 use super::{CrossingWatch, HEIGHT_MOST, HOLD, Lift, PER_FALL, WatchInput, WatchState};
 use crate::numeric::{divide, sqrt};
 use crate::units::{Millimetres, Q16, Ratio, Travel, q16};
