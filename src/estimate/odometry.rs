@@ -15,6 +15,8 @@ const KNOWN: Ratio = q16(30_000);
 /// model, if it relaxes in a third of its time or in three times that.
 const WANDERS: Ratio = q16(30_000);
 const WANDERS_PART: Ratio = q16(100_000);
+/// Creep that counts, mm: of a corner. On a wall it is always the same.
+const ON_CORNER: Millimetres = q16(2_000_000);
 /// The same of the travel after 64 mm while no step has shown the wheel's radius: 0.13 %, a wheel
 /// that is made and worn to 0.05 mm.
 const UNKNOWN_RADIUS: Ratio = q16(250_000);
@@ -228,7 +230,8 @@ impl Odometry {
     /// Variance of the position by what it has wandered since then.
     fn wander(&self, [.., crept, wound]: &[Ratio; STATES]) -> Ratio {
         let part = self.unlike.half().max(WANDERS_PART) * PER_PLACE;
-        (*crept * *crept + *wound * *wound) * part * part
+        let crept = crept.abs().min(ON_CORNER);
+        (crept * crept + *wound * *wound) * part * part
     }
 
     /// The tread creeps and winds up by so much, mm; by how much as far as the steps show.
