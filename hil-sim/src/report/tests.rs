@@ -29,7 +29,7 @@ fn the_page_of_a_long_log_is_small_too() {
     assert!(boots.iter().map(|boot| boot.rows.len()).sum::<usize>() > 18_000);
     let page = log_html(&boots);
     assert!(page.len() < 2_000_000, "{} bytes", page.len());
-    let cause = "by the reset pin; before: deploying: crossing at 2.024";
+    let cause = "by the reset pin; before: deploying: crossing at 2.025";
     assert!(page.contains(cause) && !page.contains("Deploy, "), "a mode is in words");
 }
 
