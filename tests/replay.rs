@@ -207,7 +207,7 @@ fn every_recorded_run_is_replayed_to_the_bit() {
         ("higher", 3, Some(Deploy)),
         // Commands on a corner that end at the start, at the end; buttons pressed at random.
         ("back-again", 4, Some(Retract)),
-        ("on-again", 2, Some(Deploy)),
+        ("on-again", 3, Some(Deploy)),
         ("presses", 0, Some(Retract)),
         // A wheel that slips on a corner; a late and weak preload; twice the load; late ticks.
         ("slip", 1, None),

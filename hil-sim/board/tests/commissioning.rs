@@ -195,9 +195,9 @@ fn commission(seed: u64, changes: &[Change]) -> [Vec<String>; 3] {
     [missed, refusal, accepted.map(|(change, _)| (*change).to_owned()).collect()]
 }
 
-/// Of 20 rigs 19 are within the intervals with every key, and none that has changed is accepted. Of the
-/// unchanged 15 are: two runs at one preload show friction no better than its limit of 12 %, so that
-/// one rig alone, as the short run takes it, says nothing of that.
+/// Of 20 rigs 19 are within the intervals with every key, none that has changed is accepted, and of the
+/// unchanged 15 are: two runs at one preload show friction no better than its limit of 12 %. The short
+/// run takes one, which says nothing of that.
 #[test]
 fn unknown_rigs_are_commissioned_and_accepted() {
     let (first, rigs, changes) =
@@ -211,7 +211,7 @@ fn unknown_rigs_are_commissioned_and_accepted() {
     });
     let found: Vec<_> = found.into_iter().flat_map(|half| half.expect("a verdict")).collect();
     let told = |of: usize| found.iter().filter(|(_, told)| !told[of].is_empty()).count();
-    let refused = if long() { 4 * told(1) } else { 0 };
-    assert!(20 * told(0) <= found.len() && refused <= found.len(), "{found:#?}");
+    assert!(20 * told(0) <= found.len(), "{found:#?}");
+    assert!(!long() || 4 * told(1) <= found.len(), "{found:#?}");
     assert_eq!(told(2), 0, "{found:#?}");
 }
