@@ -92,6 +92,27 @@ fn of_two_steps_in_a_row_that_are_off_alike_the_second_sets_the_position() {
     assert_eq!(closed.lift.map(|point| point.face), Some(place));
 }
 
+/// A tenth less than the arm shows right over the edge puts it further out by that of the leverage.
+#[test]
+fn a_compression_that_is_read_low_is_taken_off_the_place() {
+    let (sensed, estimator) = (sensed(0, 0.0, 0.3), estimator());
+    let place = estimator.steps.face(1).expect("a first step");
+    let mut state = EstimateState { known: Position::Located, ..EstimateState::default() };
+    state.set_position(sensed.travel, place);
+    state.over = (1, [Q16::ONE, q16(900_000)]);
+    let leverage = q16(4_000_000);
+    let lift = Some(LiftPoint { face: place, leverage, ..LiftPoint::default() });
+    state.odometry.set_by_step(sensed.travel, place);
+    state.crossing =
+        Some(OpenCrossing { step: 1, lift, corrected: true, ..OpenCrossing::default() });
+    let table = estimator.as_table(Q16::ZERO);
+    estimator.close(&mut state, &sensed, &table, &mut Findings::default());
+    let (moved, sigma) = (state.position - place, estimator.sigma(&state));
+    assert!((moved - q16(400_000)).abs() < q16(1_000), "{moved}");
+    // Its place, rounded edges, and 0.58 of what it was off by.
+    assert!((sigma - q16(320_000)).abs() < q16(5_000), "{sigma}");
+}
+
 #[test]
 fn a_step_off_its_height_is_reported_and_its_gap_learned_from_as_the_table_has_it() {
     let (sensed, estimator) = (sensed(0, 0.0, 0.3), estimator());

@@ -193,3 +193,16 @@ fn the_same_steps_found_again_and_again_leave_the_radius_alone() {
     let off: f64 = odometry.offset.to_num();
     assert!(off.abs() < 0.3 && least > q16(10_000), "{off} {least}");
 }
+
+/// Of 1 mm of creep.
+#[test]
+fn a_tread_unlike_its_model_makes_the_place_less_sure() {
+    for (unlike, sigma) in [(0, 0.247), (300_000, 0.503)] {
+        let mut odometry = Odometry::default();
+        odometry.doubt_tread(q16(unlike));
+        odometry.set(Travel::ZERO, Q16::ZERO);
+        odometry.give([Q16::ONE, Q16::ZERO]);
+        let got = odometry.sigma(Q16::ZERO).to_num::<f64>();
+        assert!((got - sigma).abs() < 0.005, "{unlike}: {got}");
+    }
+}
