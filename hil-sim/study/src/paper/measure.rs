@@ -138,7 +138,7 @@ mod tests {
     #[test]
     fn the_measured_force_is_the_one_that_the_reference_gives() {
         let case = Case::new(Loads::Prototype, 8.0, 40.0);
-        // The tread of the reference does not give way along the wall: here by 0.4 of 3 mm of rubber.
+        // The tread of the reference does not give way along the wall; this one by 0.4 of what 3 mm do.
         let mut scenario = case.scenario(0);
         (scenario.rig.tread.thickness_mm, scenario.mismatch.wind_up_compliance) = (3.0, 0.4);
         let run = experiment::run_as(&case, &scenario).unwrap();
