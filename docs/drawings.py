@@ -301,9 +301,13 @@ def wiring():
         middle = y + height / 2
         d.text(34, middle + (-4 if what else 7), name, weight="bold", size=20)
         d.text(34, middle + 20, what, size=19, color=SOFT)
+        if name == "emergency stop":
+            d.line((280, middle), (330, middle), color=BLUE, width=3)
+            d.line((330, y + 30), (330, y + 84), color=BLUE, width=3)
+            d.text(305, middle - 8, "1 kΩ", size=18, anchor="middle", color=SOFT)
         for i, signal in enumerate(signals):
             row = y + 30 + 54 * i
-            ends = [(280, row), (380, row)]
+            ends = [(330 if name == "emergency stop" else 280, row), (380, row)]
             outwards = sense == "out" and signal != "angle encoder data to the board"
             d.arrow(*(ends[::-1] if outwards else ends), color=GREEN if outwards else BLUE)
             d.text(330, row - 8, short.get(signal, ""), size=18, anchor="middle", color=SOFT)
@@ -329,9 +333,9 @@ def wiring():
         y += 310
     assert set(used) == set(pins), set(used) ^ set(pins)
     notes = ["Stop: both pins on one wire, 1 kΩ at the board, contact to ground; open = PWM off.",
-             "3.3 kΩ to ground at each PWM and enable line.",
+             "3.3 kΩ to ground at each PWM and enable line. 2.2 kΩ to 3V3 at PA0 and PA1.",
              "100 kΩ and 10 nF to ground at PC2 and PC3.",
-             "220 µF from 3V3 (CN7-16) to GND (CN7-20). Grounds joined at the bridges."]
+             "220 to 470 µF from 3V3 (CN7-16) to GND (CN7-20). Grounds joined at the bridges."]
     d.text(20, 812, *notes, size=21)
     return d
 

@@ -268,7 +268,7 @@ mod tests {
 
     #[test]
     fn the_manual_has_each_check_with_what_is_done_and_expected() {
-        let page = include_str!("../../docs/HARDWARE.md");
+        let page = include_str!("../../docs/GETTING_STARTED.md");
         for (Gate { name: stage, .. }, [name, does, expected]) in
             GATES.iter().flat_map(|gate| gate.checks.iter().map(move |check| (gate, check)))
         {

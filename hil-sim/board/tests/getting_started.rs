@@ -1,5 +1,6 @@
 //! The commands of `docs/GETTING_STARTED.md`, in its order, with the emulated board in the place of
-//! the one at the probe. They are read from the page, so that a new one is run as well.
+//! the one at the probe. They are read from the page, so that a new one is run as well. What its
+//! measurements depend on exists.
 
 use std::fs;
 use std::path::Path;
@@ -9,9 +10,11 @@ use hil_sim::testing::long;
 use crate::common::cli::rig;
 
 /// Commands before this heading are run always, the others with the long samples.
-const LONG_FROM: &str = "## 7.";
+const LONG_FROM: &str = "\n### First crossing";
 /// Commands of other programs, which set up the host.
 const ELSEWHERE: [&str; 2] = ["rustup target add ", "cargo install probe-rs-tools"];
+
+const PAGE: &str = include_str!("../../../docs/GETTING_STARTED.md");
 
 /// A block of code of the page.
 struct Block<'a> {
@@ -57,8 +60,6 @@ fn follow(place: &Path, command: &str) {
 fn every_command_of_the_page_works_in_its_order() {
     use std::os::unix::fs::PermissionsExt;
 
-    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/GETTING_STARTED.md");
-    let page = fs::read_to_string(page).expect("the page");
     let directory = tempfile::tempdir().expect("a directory");
     let place = directory.path();
     // What flashes the real board.
@@ -67,7 +68,7 @@ fn every_command_of_the_page_works_in_its_order() {
     fs::set_permissions(&probe_rs, fs::Permissions::from_mode(0o755)).expect("a program");
 
     let (mut followed, mut left) = (0, 0);
-    for Block { language, text, is_long } in blocks(&page) {
+    for Block { language, text, is_long } in blocks(PAGE) {
         if language == "toml" {
             let (name, _) = text.split_once('\n').expect("lines");
             fs::write(place.join(name.trim_start_matches("# ")), text).expect("a file");
@@ -90,4 +91,33 @@ fn every_command_of_the_page_works_in_its_order() {
         }
     }
     assert!(followed >= 7 && followed + left >= 14, "{followed} followed, {left} left");
+}
+
+/// Whether a text has this word by itself.
+fn has_word(text: &str, word: &str) -> bool {
+    text.split(|c: char| c != '_' && !c.is_alphanumeric()).any(|found| found == word)
+}
+
+#[test]
+fn the_measurements_are_there_and_name_code_that_exists() {
+    let number = |row: &str| row.strip_prefix("| ")?.split(' ').next()?.parse::<u32>().ok();
+    let mut rows: Vec<_> = PAGE.lines().filter_map(|row| Some((number(row)?, row))).collect();
+    rows.sort_unstable();
+    let numbers: Vec<u32> = rows.iter().map(|(number, _)| *number).collect();
+    assert_eq!(numbers, (1..=26).collect::<Vec<_>>());
+    assert!(!PAGE.contains("half duty"), "no command gives it");
+    let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs");
+    for (_, row) in rows {
+        // A name in back quotes and a file beside the page.
+        let parts = row.split("[`").skip(1);
+        let links: Vec<_> = parts.filter_map(|part| part.split_once("`](")).collect();
+        assert!(!links.is_empty(), "no code: {row}");
+        for (name, rest) in links {
+            let file = rest.split_once(')').expect("a link ends").0;
+            let text = fs::read_to_string(docs.join(file));
+            let text = text.unwrap_or_else(|error| panic!("{file}: {error}"));
+            assert!(has_word(&text, name), "{file} has no `{name}`");
+        }
+    }
+    assert!(!has_word("const HANG_MS", "HANG") && has_word("const HANG_MS", "HANG_MS"));
 }

@@ -6,7 +6,6 @@ mod common;
 mod cycles;
 mod faults;
 mod firmware;
-mod first_board;
 mod flash;
 mod getting_started;
 mod hil;

@@ -40,7 +40,7 @@ pub fn identified(scenario: &Scenario, is_complete: bool) -> Check {
     let by_logs = |key: &&str| scenario.sources.get(*key).is_some_and(|by| by.contains(BY));
     let shown: Vec<&str> = wanted.into_iter().filter(by_logs).collect();
     let ok = is_complete && shown.len() == wanted.len();
-    let advice = "give three complete logs, at 0.75, 1 and 1.2 times the cruise preload";
+    let advice = "give three complete logs, at 0.75, 1 and 1.25 times the cruise preload";
     check("identified", ok, format!("shown: {}", shown.join(", ")), advice)
 }
 
