@@ -17,7 +17,7 @@ use crate::plant::rig::{PlantError, VirtualRig};
 use crate::record::{Recording, starter};
 use crate::scenario::{ControllerKind, Scenario};
 
-pub use closed_loop::{Session, drives, initial_rig, read};
+pub use closed_loop::{Session, drives, initial_rig, plant_at_start, read};
 pub use stream::Stream;
 
 /// Least useful speed, mm/s.

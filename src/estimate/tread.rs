@@ -276,7 +276,8 @@ impl Tread {
         }
         let forgot = state.ticks >= FORGETS;
         if forgot || !state.rises {
-            state.rest.add(preload, meant);
+            // One that stands under its preload bears the load as well.
+            state.rest.add(if state.rises { preload } else { preload + arm_thrust }, meant);
         }
         if !forgot {
             return false;

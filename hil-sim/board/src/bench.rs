@@ -81,13 +81,9 @@ impl<'a> Bench<'a> {
         let mut wiring = Wiring::with(mistakes);
         let mut parameters = scenario.plant();
         wiring.build(&scenario.rig, &mut parameters);
-        let (position, preload) = match scenario.run.direction {
-            Direction::Deploy => (0.0, 0.0),
-            Direction::Retract => (scenario.rig.rig.travel_mm, scenario.rig.preload.cruise_n),
-        };
         let machine = Machine::new(elf)?;
         let mut sensors = Sensors::new(parameters.sensors.clone(), scenario.run.seed);
-        let plant = VirtualRig::new(parameters, position, preload, STEP_S);
+        let plant = session::plant_at_start(parameters, scenario, STEP_S);
         let codes = session::read(&mut sensors, &plant);
         let mut bench = Self {
             probe: Probe::of(&machine)?,

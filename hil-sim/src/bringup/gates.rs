@@ -16,21 +16,21 @@ pub const MINE: &str = "mine.toml";
 /// The folder, where none is named.
 pub const FOLDER: &str = "out/bringup";
 
-/// Fastest first crossing, mm/s, and slip that no crossing has, mm.
-const SLOW_MM_S: f64 = 5.5;
+/// Fastest cruise of a first crossing, mm/s, and slip that no crossing has, mm.
+const SLOW_MM_S: f64 = 5.0;
 const SLIP_MM: f64 = 0.5;
 
 /// Whether a log is that of a first crossing.
 pub fn crossed(run: &Summary, scenario: &Scenario) -> Check {
     let (steps, lines) = (scenario.rig.rig.step_positions_mm.len(), &run.crossings);
-    let fastest = lines.iter().map(|line| line.speed_mm_s).fold(0.0, f64::max);
+    let cruise = scenario.rig.drive.cruise_speed_mm_s;
     let slips = lines.iter().filter_map(|line| line.slip_measured_mm);
     let slip = slips.map(f64::abs).fold(0.0, f64::max);
     let arrives = run.completed && run.faults.is_empty() && lines.len() == steps;
-    let ok = arrives && fastest <= SLOW_MM_S && slip <= SLIP_MM;
+    let ok = arrives && cruise <= SLOW_MM_S && slip <= SLIP_MM;
     let fault = run.faults.first().map_or(String::new(), |fault| format!("; {}", fault.text));
     let of = lines.len();
-    let measured = format!("{of} of {steps} steps, {fastest:.1} mm/s, slip {slip:.2} mm{fault}");
+    let measured = format!("{of} of {steps} steps, {cruise:.1} mm/s, slip {slip:.2} mm{fault}");
     check("first crossing", ok, measured, "deploy at drive.cruise_speed_mm_s = 5 over every step")
 }
 
@@ -159,14 +159,16 @@ mod tests {
 
     #[test]
     fn a_first_crossing_is_slow_and_without_fault_or_slip() {
-        let rig = Scenario::default();
-        let line = CrossingLine { speed_mm_s: 5.1, ..CrossingLine::default() };
+        let mut rig = Scenario::default();
+        // The tread runs faster around an edge than the axle.
+        let line = CrossingLine { speed_mm_s: 6.9, ..CrossingLine::default() };
         let good = Summary { completed: true, crossings: vec![line; 3], ..Summary::default() };
+        assert!(!crossed(&good, &rig).ok, "fast");
+        rig.rig.drive.cruise_speed_mm_s = 5.0;
         assert!(crossed(&good, &rig).ok);
-        let spoilt: [fn(&mut Summary); 4] = [
+        let spoilt: [fn(&mut Summary); 3] = [
             |run| run.completed = false,
             |run| run.crossings.truncate(2),
-            |run| run.crossings[1].speed_mm_s = 8.0,
             |run| run.crossings[2].slip_measured_mm = Some(-0.8),
         ];
         for spoil in spoilt {

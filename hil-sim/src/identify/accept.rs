@@ -1,5 +1,6 @@
 //! Acceptance: logs of a rig against the virtual rig with the parameters that the controller had.
 
+use interstage::rig::Rig;
 use serde::Serialize;
 use toml::Table;
 
@@ -131,7 +132,13 @@ fn judged(
     near: Option<(&Contact, &[f64])>,
 ) -> Result<(Acceptance, Fit), IdentifyError> {
     let first = records.first().ok_or_else(|| IdentifyError::NoFit("there are no logs".into()))?;
-    if let Some(other) = records.iter().find(|other| other.scenario.rig != first.scenario.rig) {
+    let chosen = |rig: &Rig| {
+        let mut rig = rig.clone();
+        (rig.preload.cruise_n, rig.drive.cruise_speed_mm_s) = Default::default();
+        rig
+    };
+    let its = chosen(&first.scenario.rig);
+    if let Some(other) = records.iter().find(|other| chosen(&other.scenario.rig) != its) {
         let why = format!("its controller had other parameters than that of {}", first.name);
         return Err(IdentifyError::Log(other.name.clone(), why));
     }

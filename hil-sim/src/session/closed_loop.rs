@@ -12,6 +12,7 @@ use interstage::units::{Millimetres, MotorCommand, Tick};
 use super::stream::Stream;
 use super::{Options, RunError, RunningRig};
 use crate::injector::{FaultInjector, FaultTimes, RecordFound};
+use crate::plant::draw::PlantParameters;
 use crate::plant::limits::Refusal;
 use crate::plant::rig::{Drives, VirtualRig};
 use crate::plant::sensors::{Codes, Sensors};
@@ -265,18 +266,26 @@ impl RunningRig for Session {
     }
 }
 
-/// The plant of a scenario and its sensors before the first tick: for deployment with the wheel
-/// unloaded at the stow end; for retraction where deployment ended, pressed at the end of
-/// travel.
+/// The plant of a scenario and its sensors before the first tick.
 pub fn initial_rig(scenario: &Scenario) -> Result<(VirtualRig, Sensors), Refusal> {
     let parameters = scenario.plant();
     parameters.check(scenario.rig.preload.limit_n)?;
-    let (position, preload) = match scenario.run.direction {
-        Direction::Deploy => (0.0, 0.0),
-        Direction::Retract => (scenario.rig.rig.travel_mm, scenario.rig.preload.cruise_n),
-    };
     let sensors = Sensors::new(parameters.sensors.clone(), scenario.run.seed);
-    Ok((VirtualRig::new(parameters, position, preload, TICK_S), sensors))
+    Ok((plant_at_start(parameters, scenario, TICK_S), sensors))
+}
+
+/// A plant before the run of a scenario, which advances by `dt_s`: for deployment with the wheel
+/// unloaded at the stow end; for retraction where deployment ended, pressed at the end of travel,
+/// where it has borne the load for long.
+pub fn plant_at_start(parameters: PlantParameters, scenario: &Scenario, dt_s: f64) -> VirtualRig {
+    let rig = &scenario.rig;
+    match scenario.run.direction {
+        Direction::Deploy => VirtualRig::new(parameters, 0.0, 0.0, dt_s),
+        Direction::Retract => {
+            VirtualRig::new(parameters, rig.rig.travel_mm, rig.preload.cruise_n, dt_s)
+                .with_speed(0.0)
+        }
+    }
 }
 
 /// What the sensors of this plant read now, a tick after the last call.

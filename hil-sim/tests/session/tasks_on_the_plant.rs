@@ -13,15 +13,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::task::{Context, Poll, Wake, Waker};
 
-use crate::common::{
-    Bench, DIRECTIONS, Moment, NO_SLIP_MM, RIGS, STEP_CODES, end_mm, opposite, scenario, starter,
-};
+use crate::common::{Bench, DIRECTIONS, Moment, NO_SLIP_MM, RIGS, STEP_CODES, scenario, starter};
 use embassy_time::{Duration, Instant, MockDriver};
 use hil_sim::plant::ledger::Crossing;
 use hil_sim::plant::rig::{Drives, VirtualRig};
 use hil_sim::plant::sensors::{Codes, Sensors};
 use hil_sim::scenario::{Direction, Scenario};
-use hil_sim::session;
+use hil_sim::session::{self, plant_at_start};
 use interstage::hal::{
     AnalogInput, AngleBus, CommandSource, Indicator, Journal, Light, Motors, Watchdog, WheelEncoder,
 };
@@ -167,23 +165,13 @@ impl Board {
         let clock = CLOCK.lock().unwrap_or_else(PoisonError::into_inner);
         MockDriver::get().reset();
         MockDriver::get().advance(Duration::from_millis(u64::from(FIRST_TICK) - 1));
-        let direction = scenario.run.direction;
-        let pressed = match direction {
-            Direction::Deploy => 0.0,
-            Direction::Retract => scenario.rig.preload.cruise_n,
-        };
         let parameters = scenario.plant();
         let mut this = Self {
             shared: Rc::new(Shared::default()),
             tasks: Vec::new(),
             exchange: forever(Exchange::new()),
             sensors: Sensors::new(parameters.sensors.clone(), scenario.run.seed),
-            plant: VirtualRig::new(
-                parameters,
-                end_mm(scenario, opposite(direction)),
-                pressed,
-                TICK_S,
-            ),
+            plant: plant_at_start(parameters, scenario, TICK_S),
             rows: Vec::new(),
             _clock: clock,
         };
