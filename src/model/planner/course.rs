@@ -73,6 +73,8 @@ pub(super) struct RolledOut {
     pub(super) released: Seconds,
     /// Time that is lost until the speed is that of cruise again, s.
     pub(super) regains: Seconds,
+    /// Strides that were rolled.
+    pub(super) strides: u32,
 }
 
 /// An approach and what it gives.
@@ -151,6 +153,7 @@ impl Planner {
                 pause().await;
             }
             left += self.tread.stride();
+            rolled.strides = stride;
             let mut ticks = 0;
             // Up to where it goes on the tread rolls in.
             if distance > steady {

@@ -198,12 +198,12 @@ proptest! {
             unknown,
             ..Learned::default()
         };
-        let plan = planner.plan(&PlanRequest {
-            learned,
-            preload: Newtons::from_num(preload),
-            distance: Millimetres::from_num(distance),
-            ..request(direction)
-        });
+        let (preload, distance) = (Newtons::from_num(preload), Millimetres::from_num(distance));
+        let request = PlanRequest { learned, preload, distance, ..request(direction) };
+        let (mut pauses, state) = (0, &mut TreadState::default());
+        let plan = block_on(planner.plan_pausing(state, &request, async || pauses += 1));
+        // By these the board has its answer in time.
+        prop_assert!(pauses < 1000, "{pauses}");
         let target = planner.aimed[direction as usize];
         let wide = plan.gap > target + target * SAME_GAP;
         prop_assert!(plan.gap > Q16::ZERO);
@@ -212,7 +212,7 @@ proptest! {
         prop_assert!(approach.slowest_speed <= approach.window_speed);
         prop_assert!(approach.window_speed <= planner.cruise_speed);
         prop_assert!(approach.slowest_speed >= planner.least_speed.min(approach.window_speed));
-        prop_assert!(plan.cross_preload <= planner.most_preload.max(Newtons::from_num(preload)));
+        prop_assert!(plan.cross_preload <= planner.most_preload.max(preload));
     }
 }
 
