@@ -10,7 +10,7 @@ use std::time::Duration;
 
 pub use channels::{Access, ChannelError, Channels, Rtt};
 #[cfg(feature = "probe")]
-pub use real::RealPort;
+pub(crate) use real::RealPort;
 pub use reconnecting::ReconnectingPort;
 #[cfg(test)]
 pub(crate) use reconnecting::tests as script;

@@ -27,7 +27,7 @@ pub const AFTER_S: f64 = 1.0;
 
 /// Longest run out and back, s: half of what one direction alone may take at the least useful
 /// speed, and three times the travel at cruise speed.
-pub fn longest_s(rig: &Rig) -> f64 {
+pub(crate) fn longest_s(rig: &Rig) -> f64 {
     let cruise_s = rig.rig.travel_mm / rig.drive.cruise_speed_mm_s;
     (0.5 * session::longest_s(rig)).max(3.0 * cruise_s)
 }
@@ -175,7 +175,7 @@ pub struct FaultCampaign {
 }
 
 /// Each rig and its run without a fault.
-pub type Rigs = Vec<(Scenario, Twin)>;
+pub(crate) type Rigs = Vec<(Scenario, Twin)>;
 
 impl FaultCampaign {
     /// Runs each rig without a fault.

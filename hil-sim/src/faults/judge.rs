@@ -20,7 +20,7 @@ use crate::scenario::{Scenario, StepAnomaly, TICK_S};
 /// that reads two thirds makes of it; docs/SAFETY.md has what a part of 1 finds.
 const BEYOND: (f64, f64) = (1.6, 3.0);
 /// Gap that a run may have which reports nothing, parts of the reference gap.
-pub const GAP_PART: f64 = 1.1;
+pub(crate) const GAP_PART: f64 = 1.1;
 /// Limits that report what the controller does about its task, not that anything is wrong.
 const OPERATIONAL: [Limit; 5] = [
     Limit::PreloadLimited,
@@ -120,7 +120,7 @@ pub struct Judge {
 
 impl Judge {
     /// Before the first tick of a run.
-    pub fn new(scenario: &Scenario, truth: &Truth) -> Self {
+    pub(crate) fn new(scenario: &Scenario, truth: &Truth) -> Self {
         let fault = scenario.run.faults.first();
         let target = fault.map(|fault| fault.target);
         let reset = fault.filter(|fault| fault.target == Target::Reset);
@@ -208,7 +208,7 @@ impl Judge {
     /// What became of the fault. `known` are the limits of the same run without it,
     /// `gap_part` the largest gap over the reference, `crossed` whether every step was
     /// crossed; a stop on command is as good an end as arrival.
-    pub fn finding(&self, known: &[u16], gap_part: f64, crossed: bool) -> Finding {
+    pub(crate) fn finding(&self, known: &[u16], gap_part: f64, crossed: bool) -> Finding {
         let ended = match self.mode {
             Mode::Complete(_) => crossed || self.commanded,
             _ => self.mode.is_at_rest(),
@@ -257,7 +257,7 @@ impl Judge {
 
     /// The report that counts, when, s, and its code: the fault or else the first limit, one that
     /// names what was injected before others.
-    pub fn report(&self, known: &[u16]) -> Option<(f64, u16)> {
+    pub(crate) fn report(&self, known: &[u16]) -> Option<(f64, u16)> {
         let all = || self.fault.into_iter().chain(self.new_limits(known));
         all().find(|(_, code)| self.names(*code)).or(all().next())
     }

@@ -78,10 +78,6 @@ impl<P: Port> Client<P> {
         }
     }
 
-    pub fn restart(&mut self) -> Result<(), StoreError> {
-        self.done(Request::Restart)
-    }
-
     fn read(&mut self, length: usize) -> Result<Vec<u8>, StoreError> {
         let mut set = Vec::new();
         while set.len() < length {

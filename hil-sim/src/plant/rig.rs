@@ -66,7 +66,7 @@ pub struct Drives {
 
 impl Drives {
     /// Duty that drive and pre-tightener work with.
-    pub fn worked(&self) -> [f64; 2] {
+    pub(crate) fn worked(&self) -> [f64; 2] {
         [self.drive * (1.0 - self.lost[0]), self.preload * (1.0 - self.lost[1])]
     }
 }
