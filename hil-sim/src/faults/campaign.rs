@@ -135,6 +135,11 @@ impl<'a> Trial<'a> {
         self.judge.finding(&self.twin.limits, self.gap_part, self.crossed)
     }
 
+    /// Which bounds of the mechanism were exceeded, in words.
+    pub fn harms(&self) -> Vec<String> {
+        self.judge.harms(self.gap_part)
+    }
+
     /// The report that counts: when, s, and its code.
     pub fn report(&self) -> Option<(f64, u16)> {
         self.judge.report(&self.twin.limits)
@@ -159,7 +164,7 @@ impl<'a> Trial<'a> {
             peak_preload_n: judge.peak_preload_n,
             motion_mm: judge.motion_mm,
             gap_part: self.gap_part,
-            harms: judge.harms(),
+            harms: self.harms(),
         }
     }
 }
