@@ -7,7 +7,7 @@
 
 mod drive;
 mod figures;
-pub mod gates;
+pub(crate) mod gates;
 mod line;
 mod motion;
 mod operate;
@@ -29,7 +29,7 @@ pub use figures::stowed;
 pub use line::Line;
 pub use operate::{FARTHEST_MM, Operated, Operation, operate};
 pub use operator::{Action, Operator, Question, Seen, Sensor, Stdin};
-pub use page::html;
+pub(crate) use page::html;
 pub use state::Progress;
 
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -136,7 +136,7 @@ gates! {
 
 impl Stage {
     /// In words.
-    pub fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         GATES[self as usize].name
     }
 }

@@ -7,8 +7,8 @@ mod shard;
 
 use rayon::prelude::*;
 
-pub use frame::{AS_GIVEN, Column, Frame, column};
-pub use shard::Shard;
+pub(crate) use frame::{AS_GIVEN, Column, Frame, column};
+pub(crate) use shard::Shard;
 
 /// What watches a campaign.
 #[derive(Clone, Copy)]
@@ -38,7 +38,7 @@ impl<C: Sync, L: Send, O, E: Send> Campaign<'_, C, L, O, E> {
     /// The lines of the cases at these places, on all processors, without those that had not
     /// begun or were given up when an end was wanted. The lines do not depend on the number of
     /// processors.
-    pub fn lines(&self, places: &[usize], watch: Watch) -> Result<Vec<(usize, L)>, E> {
+    pub(crate) fn lines(&self, places: &[usize], watch: Watch) -> Result<Vec<(usize, L)>, E> {
         let Self { cases, run, .. } = self;
         let line = |place: &usize| {
             let line = run(&cases[*place], watch).transpose()?;
@@ -48,7 +48,7 @@ impl<C: Sync, L: Send, O, E: Send> Campaign<'_, C, L, O, E> {
     }
 
     /// The outcome of these lines, each with the place of its case.
-    pub fn outcome(self, lines: Vec<(usize, L)>) -> O {
+    pub(crate) fn outcome(self, lines: Vec<(usize, L)>) -> O {
         let mut lines: std::collections::BTreeMap<usize, L> = lines.into_iter().collect();
         let cases = self.cases.into_iter().enumerate();
         (self.fold)(cases.filter_map(|(at, case)| Some((case, lines.remove(&at)?))).collect())

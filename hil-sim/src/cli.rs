@@ -7,7 +7,7 @@
 
 mod accept;
 pub mod bringup;
-pub mod campaign;
+pub(crate) mod campaign;
 pub mod capture;
 mod compare;
 mod completions;
@@ -28,10 +28,10 @@ pub mod output;
 pub mod params;
 mod parse;
 mod probe;
-pub mod replay;
+pub(crate) mod replay;
 mod report;
-pub mod scenario;
-pub mod source;
+pub(crate) mod scenario;
+pub(crate) mod source;
 mod stress;
 mod sweep;
 pub mod terminal;

@@ -16,10 +16,10 @@ use crate::scenario::{ControllerKind, Scenario};
 use crate::session::RunError;
 
 use tuning::MOST_TRIES;
-pub use tuning::TUNED_WITHIN;
+pub(crate) use tuning::TUNED_WITHIN;
 
 /// The strategies, the one that the others are compared with first.
-pub const STRATEGIES: [ControllerKind; 4] = [
+pub(crate) const STRATEGIES: [ControllerKind; 4] = [
     ControllerKind::Scheduled,
     ControllerKind::Constant,
     ControllerKind::Limit,
@@ -27,11 +27,11 @@ pub const STRATEGIES: [ControllerKind; 4] = [
 ];
 
 /// Name of the entry of the best runs.
-pub const ORACLE: &str = "oracle";
+pub(crate) const ORACLE: &str = "oracle";
 
 /// One strategy over all rigs.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Entry {
+pub(crate) struct Entry {
     /// Strategy, or [`ORACLE`].
     pub controller: String,
     /// Part of the reference gap by which the planner's own one is below it; the tuning. None for
@@ -84,7 +84,7 @@ impl Entry {
 
 /// A strategy over all rigs and, behind the scheduled one, the oracle.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct Compared {
+pub(crate) struct Compared {
     entry: Entry,
     oracle: Option<Entry>,
     /// Seeds of plants for which the oracle found no run, and which bound it could not keep.
@@ -92,7 +92,7 @@ pub struct Compared {
 }
 
 #[derive(Clone, Debug, Serialize)]
-pub struct Comparison {
+pub(crate) struct Comparison {
     /// Rigs drawn.
     pub runs: usize,
     pub gap_ref_mm: f64,
@@ -111,7 +111,7 @@ pub struct Comparison {
 /// the same friction check and aims at a gap that lies below the reference by a reserve. The
 /// reserve of each is tuned until its worst gap over all rigs is the reference; then the times are
 /// comparable.
-pub fn campaign(
+pub(crate) fn campaign(
     scenario: &Scenario,
     seeds: Vec<u64>,
     effort: Option<oracle::Effort>,

@@ -14,7 +14,7 @@ use crate::scenario::{ControllerKind, Scenario};
 use crate::session::{Options, RunError, Session, run_session};
 
 pub use grid::Grid;
-pub use picture::picture;
+pub(crate) use picture::picture;
 
 /// One strategy at one place of the grid.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

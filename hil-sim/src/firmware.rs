@@ -16,7 +16,7 @@ use serde_json::Value;
 use crate::probe::{Port, PortError};
 
 /// Compilation target of the board.
-pub const TARGET: &str = "thumbv7em-none-eabihf";
+pub(crate) const TARGET: &str = "thumbv7em-none-eabihf";
 
 /// Name of the package and of its binary.
 const PACKAGE: &str = "interstage";
@@ -129,11 +129,11 @@ pub(crate) fn ensure_target() -> Result<(), FirmwareError> {
 
 /// Builds the image, adding the target first if it is missing, and returns its path.
 /// Progress and cargo's messages go to standard error.
-pub fn build(profile: Profile) -> Result<PathBuf, FirmwareError> {
+pub(crate) fn build(profile: Profile) -> Result<PathBuf, FirmwareError> {
     build_binary(PACKAGE, PACKAGE, profile, &[])
 }
 
-/// Builds a binary for the board as [`build`] does the firmware, with these settings
+/// Builds a binary for the board as `build` does the firmware, with these settings
 /// of cargo (`key=value`) instead of the workspace's.
 pub fn build_binary(
     package: &str,

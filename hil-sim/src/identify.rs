@@ -1,17 +1,17 @@
 //! Identifies the parameters of a rig from its logs.
 
 pub mod accept;
-pub mod actuator;
+pub(crate) mod actuator;
 mod agree;
-pub mod contact;
-pub mod coordinates;
-pub mod forward;
-pub mod least_squares;
-pub mod plot;
+pub(crate) mod contact;
+pub(crate) mod coordinates;
+pub(crate) mod forward;
+pub(crate) mod least_squares;
+pub(crate) mod plot;
 pub mod published;
 pub mod record;
 pub mod result;
-pub mod traces;
+pub(crate) mod traces;
 
 /// Why nothing was identified.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

@@ -28,7 +28,7 @@ const SAME_CORNER_MM: f64 = 5.0;
 
 /// The snapshot of the last tick that a reset finds.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum RecordFound {
+pub(crate) enum RecordFound {
     /// As it was written.
     Intact,
     /// Not trusted, with its position off by so much, mm.
@@ -213,7 +213,7 @@ impl FaultInjector {
     }
 
     /// The reset of this tick, if there is one, by the snapshot that it finds.
-    pub fn reset(&mut self) -> Option<RecordFound> {
+    pub(crate) fn reset(&mut self) -> Option<RecordFound> {
         let here = |fault: &&mut Active| {
             fault.injection.target == Target::Reset && fault.since_s.is_some() && !fault.done
         };

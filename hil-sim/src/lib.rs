@@ -2,9 +2,9 @@
 //! reports on them.
 
 pub mod bringup;
-pub mod campaign;
+pub(crate) mod campaign;
 pub mod cli;
-pub mod compare;
+pub(crate) mod compare;
 pub mod envelope;
 pub mod faults;
 pub mod files;
@@ -14,7 +14,7 @@ pub mod identify;
 pub mod injector;
 pub mod live;
 pub mod montecarlo;
-pub mod oracle;
+pub(crate) mod oracle;
 pub mod params;
 pub mod plant;
 pub mod probe;
@@ -27,6 +27,6 @@ pub mod rollout;
 pub mod scenario;
 pub mod session;
 pub mod stress;
-pub mod sweep;
+pub(crate) mod sweep;
 pub mod table;
 pub mod testing;

@@ -4,5 +4,5 @@ mod plot;
 mod screen;
 mod server;
 
-pub use screen::{Known, Screen};
+pub(crate) use screen::{Known, Screen};
 pub use server::Server;

@@ -16,7 +16,7 @@
 
 mod drive;
 mod leg;
-pub mod pattern;
+pub(crate) mod pattern;
 
 use crate::montecarlo::RunLine;
 use crate::report::verdict::SLIP_SEEN_MM;
@@ -31,7 +31,7 @@ const BROKEN_S: f64 = 100.0;
 
 /// How thoroughly the oracle searches.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Effort {
+pub(crate) struct Effort {
     /// Halvings of the pattern search.
     halvings: usize,
     /// Distances before and behind the event, mm, from which the search of a leg starts.
@@ -40,9 +40,11 @@ pub struct Effort {
 
 impl Effort {
     /// One start, one halving of the search's steps: for tests.
-    pub const COARSE: Self = Self { halvings: 1, starts: &[(0.8, 0.2)] };
+    #[cfg(test)]
+    pub(crate) const COARSE: Self = Self { halvings: 1, starts: &[(0.8, 0.2)] };
     /// Until more no longer matters.
-    pub const FULL: Self = Self { halvings: 4, starts: &[(0.8, 0.2), (0.8, -0.5), (0.4, -0.3)] };
+    pub(crate) const FULL: Self =
+        Self { halvings: 4, starts: &[(0.8, 0.2), (0.8, -0.5), (0.4, -0.3)] };
 }
 
 /// Most runs of a leg for one crossing speed.
@@ -50,7 +52,7 @@ const TRIES: usize = 5;
 
 /// What the best run must keep.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Bounds {
+pub(crate) struct Bounds {
     /// Largest gap at a step, mm.
     pub gap_mm: f64,
     /// Least friction left unused in a crossing.
@@ -59,7 +61,7 @@ pub struct Bounds {
 
 impl Bounds {
     /// Its gap, or the reference if it did not complete; the `wanted` margin, or its own if less.
-    pub fn of(line: &RunLine, gap_ref_mm: f64, wanted: f64) -> Self {
+    pub(crate) fn of(line: &RunLine, gap_ref_mm: f64, wanted: f64) -> Self {
         let kept = line.least_slip_margin.filter(|_| line.completed).zip(Some(line.max_gap_mm));
         let (slip_margin, gap_mm) = kept.unwrap_or((0.0, gap_ref_mm));
         Self { gap_mm, slip_margin: slip_margin.clamp(0.0, wanted) }
@@ -68,7 +70,7 @@ impl Bounds {
 
 /// The best run.
 #[derive(Clone, Debug, PartialEq)]
-pub struct OracleRun {
+pub(crate) struct OracleRun {
     /// Its figures, as those of any run.
     pub line: RunLine,
     /// Crossing speed, mm/s, and preload, N, of each leg.
@@ -78,7 +80,11 @@ pub struct OracleRun {
 /// The fastest run of the scenario's plant that keeps these bounds, the preload limit, and on
 /// the continuous wall the controller's slip margin. A run that cannot keep them does not
 /// complete, and its line says why.
-pub fn search(scenario: &Scenario, bounds: &Bounds, effort: Effort) -> Result<OracleRun, RunError> {
+pub(crate) fn search(
+    scenario: &Scenario,
+    bounds: &Bounds,
+    effort: Effort,
+) -> Result<OracleRun, RunError> {
     let (plant, _) = initial_rig(scenario)?;
     let rig = &scenario.rig;
     let forward = scenario.run.direction == Direction::Deploy;

@@ -95,13 +95,13 @@ pub fn set_of(name: &str, rig: &Rig) -> Result<Vec<u8>, CompileError> {
 
 /// A file that holds one set. Until it exists, the prototype's set is active.
 #[derive(Clone, Debug)]
-pub struct SetFile {
+pub(crate) struct SetFile {
     path: PathBuf,
 }
 
 impl SetFile {
     /// This file, which need not exist.
-    pub fn new(path: &Path) -> Self {
+    pub(crate) fn new(path: &Path) -> Self {
         Self { path: path.to_owned() }
     }
 

@@ -1,14 +1,14 @@
 //! The rig as physics, in f64; lengths in mm, forces in N, times in s. It knows
 //! nothing of the controller's model.
 
-pub mod actuators;
+pub(crate) mod actuators;
 pub mod arm;
 pub mod balance;
 pub mod crossing;
 pub mod draw;
-pub mod grip;
+pub(crate) mod grip;
 pub mod ledger;
-pub mod limits;
+pub(crate) mod limits;
 pub mod mismatch;
 pub mod precision;
 pub mod rig;
@@ -16,6 +16,6 @@ pub mod ring;
 pub mod rolling;
 pub mod sensors;
 pub mod spread;
-pub mod truth;
+pub(crate) mod truth;
 pub mod wall;
-pub mod wind_up;
+pub(crate) mod wind_up;

@@ -8,9 +8,12 @@ mod reconnecting;
 
 use std::time::Duration;
 
+use interstage::params::link::FrameReader;
+use serde::de::DeserializeOwned;
+
 pub use channels::{Access, ChannelError, Channels, Rtt};
 #[cfg(feature = "probe")]
-pub use real::RealPort;
+pub(crate) use real::RealPort;
 pub use reconnecting::ReconnectingPort;
 #[cfg(test)]
 pub(crate) use reconnecting::tests as script;
@@ -55,6 +58,36 @@ pub trait Port {
 
     /// Time of the board since the port was opened: elapsed or emulated.
     fn now(&self) -> Duration;
+}
+
+/// Sends a frame down a channel, again after each `retry` without an answer, until `picked` takes a
+/// message that has come up another; none within `timeout`, of the board's time.
+pub(crate) fn exchange<M: DeserializeOwned, T>(
+    port: &mut (impl Port + ?Sized),
+    reader: &mut FrameReader,
+    (down, up): (u32, u32),
+    frame: &[u8],
+    (retry, timeout): (Duration, Duration),
+    mut picked: impl FnMut(M) -> Option<T>,
+) -> Result<Option<T>, PortError> {
+    let since = port.now();
+    let (mut left, mut sent) = (frame, since);
+    while port.now().saturating_sub(since) < timeout {
+        if left.is_empty() && port.now() >= sent + retry {
+            left = frame;
+        }
+        if !left.is_empty() {
+            left = &left[port.down(down, left)?..];
+            sent = port.now();
+        }
+        port.pass()?;
+        for byte in port.up(up)? {
+            if let Some(answer) = reader.take(byte).and_then(&mut picked) {
+                return Ok(Some(answer));
+            }
+        }
+    }
+    Ok(None)
 }
 
 #[cfg(test)]

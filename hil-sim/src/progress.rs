@@ -43,7 +43,7 @@ impl Progress {
     }
 
     /// Prints a line above the bar; without a terminal, just the line.
-    pub fn line(&self, text: &str) {
+    pub(crate) fn line(&self, text: &str) {
         self.0.suspend(|| eprintln!("{text}"));
     }
 }

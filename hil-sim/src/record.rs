@@ -1,6 +1,6 @@
 //! The record of a run: one row a tick, events, the ledger of the crossings, a summary.
 //!
-//! [`tick`] lists the columns. [`Decoder`] and [`Run`] read the controller's binary log;
+//! `tick` lists the columns. [`Decoder`] and [`Run`] read the controller's binary log;
 //! [`Writer`] and [`write_all`] write MCAP, CSV and JSON, [`recordings`] reads them.
 
 mod columns;
@@ -15,28 +15,26 @@ mod recording;
 mod run;
 mod source;
 mod summary;
-pub mod tick;
+pub(crate) mod tick;
 mod time_lost;
 mod view;
 mod write;
 
-pub use columns::Column;
-pub use csv_file::{Metadata, write_metadata};
+pub(crate) use columns::Column;
+pub(crate) use csv_file::{Metadata, write_metadata};
 pub use decoder::{Counts, Decoder, Item, Mark};
 pub use joined::JoinedLog;
 pub use mcap_file::{FRAMES, Topic, messages, unwrapped, write_mcap};
 pub use probed::Probed;
-pub use read::{ReadError, log_at};
-pub use recorder::{RunRecorder, text};
+pub(crate) use read::log_at;
+pub(crate) use recorder::{RunRecorder, text};
 pub use recording::recordings;
 pub use run::{Boot, Cut, Header, Run, Unknown};
 pub use source::{Bytes, Source, SourceError, Virtual, letter, starter};
 pub(crate) use summary::or_nan;
 pub use summary::{CrossingLine, LedgerLine, LogLine, Recording, Report, Summary};
-pub use tick::{
-    Controller, MODE_NAMES, STAGE_NAMES, Tick, TrueState, mode_number, mode_words, stage_name,
-};
-pub use time_lost::TimeLost;
-pub use view::View;
-pub(crate) use view::shown;
+pub use tick::{Controller, MODE_NAMES, Tick, TrueState};
+pub(crate) use tick::{STAGE_NAMES, mode_number, mode_words, stage_name};
+pub(crate) use time_lost::TimeLost;
+pub(crate) use view::{View, shown};
 pub use write::{WriteError, Writer, write_all, write_csv};

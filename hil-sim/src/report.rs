@@ -13,15 +13,15 @@ pub mod palette;
 pub mod panel;
 mod panels;
 mod scene;
-pub mod svg;
+pub(crate) mod svg;
 mod tables;
 pub(crate) mod verdict;
 
-pub use animated::animated_svg;
-pub use compare::{Difference, beside_svg, compare_html, differences, table as compared};
+pub(crate) use animated::animated_svg;
+pub(crate) use compare::{Difference, beside_svg, compare_html, differences, table as compared};
 pub(crate) use page::capital;
 pub use page::{Section, html, log_html, page_of};
-pub use panels::overview_svg;
+pub(crate) use panels::overview_svg;
 pub(crate) use scene::Geometry;
 pub(crate) use tables::{COLUMNS, slowed_by, table};
 

@@ -85,7 +85,7 @@ impl Wheel {
 
     /// The same with the speed, mm/s, and the radial force, N, of each place of the axle, mm from
     /// the face outwards.
-    pub fn cross_along(
+    pub(crate) fn cross_along(
         &self,
         setup: &CrossingSetup,
         course: &dyn Fn(f64) -> (f64, f64),

@@ -29,14 +29,14 @@ use merge::{COMMAND_LINE, Merged, Provenance};
 /// Control period, s.
 pub const TICK_S: f64 = 1e-3;
 
-pub use keys::{KeyInfo, PRESETS};
+pub(crate) use keys::{KeyInfo, PRESETS};
 pub(crate) use keys::{leaves, nearest_word};
 pub use run::{ControllerKind, Direction, MismatchDraw, RunOptions, StepAnomaly};
 
 /// One rig, its mismatch, its noise and its run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Scenario {
-    /// The preset that it started from, one of [`PRESETS`].
+    /// The preset that it started from, one of `PRESETS`.
     pub preset: String,
     /// The rig by the controller's parameters; its sections are beside the others.
     #[serde(flatten)]
@@ -166,7 +166,7 @@ impl Scenario {
     }
 
     /// Properties of the rig that nobody has measured: the preset's value, and no source.
-    pub fn assumed(&self) -> Vec<String> {
+    pub(crate) fn assumed(&self) -> Vec<String> {
         let stated = self.overrides();
         let is_known = |key: &String| stated.contains_key(key) || self.sources.contains_key(key);
         let measured = self.keys().into_iter().filter(|info| info.measure).map(|info| info.key);
@@ -187,7 +187,7 @@ impl Scenario {
     ///
     /// # Errors
     /// If a scenario cannot have the last of them.
-    pub fn seeds(&self, count: u64) -> Result<Vec<u64>, ScenarioError> {
+    pub(crate) fn seeds(&self, count: u64) -> Result<Vec<u64>, ScenarioError> {
         let seed = self.run.seed;
         let last = seed.checked_add(count).filter(|last| i64::try_from(*last).is_ok());
         let most = (i64::MAX as u64).saturating_sub(count);

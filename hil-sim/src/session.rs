@@ -18,7 +18,6 @@ use crate::record::{Recording, starter};
 use crate::scenario::{ControllerKind, Scenario};
 
 pub use closed_loop::{Session, drives, initial_rig, plant_at_start, read};
-pub use stream::Stream;
 
 /// Least useful speed, mm/s.
 const SLOWEST_MM_S: f64 = 2.0;

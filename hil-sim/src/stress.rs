@@ -11,7 +11,7 @@ use serde::Serialize;
 
 use crate::campaign::{Campaign, Watch};
 
-pub use cases::StressCase;
+pub(crate) use cases::StressCase;
 use cases::{RADIUS_MM, beyond, draw};
 
 /// Deepest that the tread may be pressed in, parts of the radius: the hub.

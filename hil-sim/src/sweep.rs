@@ -6,14 +6,14 @@ use std::str::FromStr;
 
 use serde_json::{Map, Value};
 
-pub use picture::{Plot, picture};
+pub(crate) use picture::{Plot, picture};
 
 /// Most places of a grid.
 pub(crate) const MOST: usize = 10_000;
 
 /// A key with the values that it takes one after the other.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Axis {
+pub(crate) struct Axis {
     pub key: String,
     /// Its values, as `--set` takes them.
     pub values: Vec<String>,
@@ -71,7 +71,7 @@ fn rounded(value: f64) -> String {
 }
 
 /// Every place of the grid, the last key fastest: a value of each axis.
-pub fn places<'a>(axes: &'a [Axis]) -> Vec<Vec<&'a str>> {
+pub(crate) fn places<'a>(axes: &'a [Axis]) -> Vec<Vec<&'a str>> {
     let mut places = vec![Vec::new()];
     for axis in axes {
         let with = |place: &Vec<&'a str>| -> Vec<Vec<&'a str>> {
@@ -83,7 +83,7 @@ pub fn places<'a>(axes: &'a [Axis]) -> Vec<Vec<&'a str>> {
 }
 
 /// A row: the values of the keys, then what was found there.
-pub fn row(axes: &[Axis], place: &[&str], found: Map<String, Value>) -> Map<String, Value> {
+pub(crate) fn row(axes: &[Axis], place: &[&str], found: Map<String, Value>) -> Map<String, Value> {
     let value = |text: &str| {
         let number = text.parse::<f64>().ok().and_then(serde_json::Number::from_f64);
         number.map_or_else(|| Value::from(text), Value::Number)

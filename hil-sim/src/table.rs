@@ -1,4 +1,4 @@
-//! Tables and text of the terminal, at most [`width`] columns wide, and their numbers.
+//! Tables and text of the terminal, at most `width` columns wide, and their numbers.
 
 use comfy_table::presets::UTF8_HORIZONTAL_ONLY;
 use comfy_table::{
@@ -8,15 +8,15 @@ use comfy_table::{
 /// Most columns that the output takes.
 const WIDTH: u16 = 100;
 /// Columns that every output may take.
-pub const NARROW: u16 = 80;
+pub(crate) const NARROW: u16 = 80;
 
 /// Columns that the output takes: those of the terminal within 80 to 100, elsewhere 100.
-pub fn width() -> u16 {
+pub(crate) fn width() -> u16 {
     Table::new().width().map_or(WIDTH, |columns| columns.clamp(NARROW, WIDTH))
 }
 
 /// `text` broken at blanks to at most this many columns, each line after `indent`.
-pub fn wrapped(text: &str, indent: &str, columns: u16) -> String {
+pub(crate) fn wrapped(text: &str, indent: &str, columns: u16) -> String {
     let most = usize::from(columns) - indent.len();
     let mut lines: Vec<String> = Vec::new();
     for word in text.split_whitespace() {
@@ -31,7 +31,7 @@ pub fn wrapped(text: &str, indent: &str, columns: u16) -> String {
 }
 
 /// A count of things of which one is a `noun`: "1 run", "2 runs".
-pub fn counted(count: impl std::fmt::Display, noun: &str) -> String {
+pub(crate) fn counted(count: impl std::fmt::Display, noun: &str) -> String {
     let count = count.to_string();
     let plural = if count == "1" || count == "-1" { "" } else { "s" };
     format!("{count} {noun}{plural}")
@@ -83,7 +83,7 @@ pub fn number(value: impl Into<Option<f64>>, decimals: usize) -> String {
 }
 
 /// `value` with `decimals`, without a negative zero.
-pub fn label(value: f64, decimals: usize) -> String {
+pub(crate) fn label(value: f64, decimals: usize) -> String {
     let text = format!("{value:.decimals$}");
     if text.trim_start_matches(['-', '0', '.']).is_empty() {
         text.trim_start_matches('-').to_owned()
@@ -93,7 +93,7 @@ pub fn label(value: f64, decimals: usize) -> String {
 }
 
 /// `value` with `decimals` and its sign; without one where it rounds to zero.
-pub fn signed(value: f64, decimals: usize) -> String {
+pub(crate) fn signed(value: f64, decimals: usize) -> String {
     let text = label(value, decimals);
     let zero = text.trim_start_matches(['0', '.']).is_empty();
     if zero || text.starts_with('-') { text } else { format!("+{text}") }

@@ -23,7 +23,7 @@ pub fn long() -> bool {
 /// Runs every pass and then `cargo test` with `arguments`; returns the exit code of the
 /// first that failed, or 0. Headings, times and cargo's messages go to standard error;
 /// the last lines of standard output are those of the tests.
-pub fn run(arguments: &[String], long: bool) -> Result<u8> {
+pub(crate) fn run(arguments: &[String], long: bool) -> Result<u8> {
     let manifest = firmware::workspace().join("Cargo.toml");
     ensure!(manifest.is_file(), "{}: the workspace is no longer there", manifest.display());
     let mut times = String::new();

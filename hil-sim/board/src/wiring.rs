@@ -13,6 +13,8 @@ use super::chip::{Chip, Pin};
 
 /// Code of a sensor without load: 5 % of the converter.
 const ZERO: i32 = 3277;
+/// Codes from there to full scale: 85 %.
+const FULL: f64 = 55_704.75;
 /// Code of an open input whose pull-down is missing: it keeps some charge.
 const FLOATING: u16 = 21_000;
 /// What a sensor shows of its quantity, in percent.
@@ -23,8 +25,8 @@ const GAINS: [(Mistake, i32); 5] = [
     (Mistake::PreloadScale, 110),
     (Mistake::CompressionScale, 90),
 ];
-/// Code of a preload sensor at its stop: 13 N of 200 N.
-const PRELOAD_STOP: i32 = ZERO + 3621;
+/// Preload at which its sensor is at its stop, N.
+const PRELOAD_STOP_N: f64 = 13.0;
 /// By how much the angle's zero code is off, codes.
 const ANGLE_OFF: i32 = 900;
 /// Friction of a wheel that cannot be turned, N.
@@ -106,8 +108,9 @@ pub enum Mistake {
 #[derive(Clone, Debug, Default)]
 pub struct Wiring {
     mistakes: Vec<Mistake>,
-    /// The angle's code at the stow end.
+    /// The angle's code at the stow end, and that of a preload sensor at its stop.
     stowed: i32,
+    preload_stop: i32,
     /// The emergency stop is pressed.
     pub stop_pressed: bool,
     /// The motor supply is switched off.
@@ -129,6 +132,8 @@ impl Wiring {
     /// The plant of this rig as built.
     pub fn build(&mut self, rig: &Rig, plant: &mut PlantParameters) {
         self.stowed = stowed(rig).round() as i32;
+        let stop = FULL * PRELOAD_STOP_N / rig.sense.preload_full_scale_n;
+        self.preload_stop = ZERO + stop.round() as i32;
         if self.has(Mistake::PreloadNoise) {
             plant.sensors.noise.preload_sensor_n *= 10.0;
         }
@@ -198,7 +203,7 @@ impl Wiring {
             *code = ZERO + (*code - ZERO) * percent / 100;
         }
         if self.has(Mistake::PreloadStop) {
-            preload = preload.min(PRELOAD_STOP);
+            preload = preload.min(self.preload_stop);
         }
         if self.has(Mistake::PreloadOpen) || self.unplugged.contains(&Sensor::Preload) {
             let floats = self.has(Mistake::PreloadPullDown);
@@ -253,5 +258,35 @@ impl Wiring {
         }
         let bits = (code & 0x3FFF) as u16;
         bits | ((bits.count_ones() & 1) as u16) << 15
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use hil_sim::scenario::Scenario;
+
+    use super::*;
+
+    #[test]
+    fn a_mistake_is_as_large_on_another_rig() {
+        for full_scale_n in [200.0, 80.0] {
+            let sets = [
+                format!("sense.preload_full_scale_n={full_scale_n}"),
+                "rig.arm_length_mm=160".into(),
+            ];
+            let scenario = Scenario::default().with(&sets).expect("in range");
+            let mut wiring = Wiring::with(&[Mistake::PreloadStop, Mistake::ArmInwards]);
+            wiring.build(&scenario.rig, &mut scenario.plant());
+            let codes = |preload_n: f64, arm: f64| {
+                let arm = arm as u16;
+                let preload = 65_535.0 * (0.05 + 0.85 * preload_n / full_scale_n);
+                [0, preload.round() as u16, 0, arm | ((arm.count_ones() & 1) as u16) << 15]
+            };
+            let passed = |sensors| wiring.codes(Codes { sensors, bridges: BridgeCodes::default() });
+            let stow = stowed(&scenario.rig).round();
+            // Below 13 N, and at the stow end, nothing shows.
+            assert_eq!(passed(codes(12.9, stow)).sensors, codes(12.9, stow));
+            assert_eq!(passed(codes(30.0, stow + 100.0)).sensors, codes(13.0, stow - 100.0));
+        }
     }
 }

@@ -11,17 +11,17 @@ use crate::record::Summary;
 use crate::scenario::Scenario;
 
 /// Files in the folder of a rig: how far it has come, and its parameters.
-pub const STATE: &str = "bringup.json";
-pub const MINE: &str = "mine.toml";
+pub(crate) const STATE: &str = "bringup.json";
+pub(crate) const MINE: &str = "mine.toml";
 /// The folder, where none is named.
-pub const FOLDER: &str = "out/bringup";
+pub(crate) const FOLDER: &str = "out/bringup";
 
 /// Fastest cruise of a first crossing, mm/s, and slip that no crossing has, mm.
 const SLOW_MM_S: f64 = 5.0;
 const SLIP_MM: f64 = 0.5;
 
 /// Whether a log is that of a first crossing.
-pub fn crossed(run: &Summary, scenario: &Scenario) -> Check {
+pub(crate) fn crossed(run: &Summary, scenario: &Scenario) -> Check {
     let (steps, lines) = (scenario.rig.rig.step_positions_mm.len(), &run.crossings);
     let cruise = scenario.rig.drive.cruise_speed_mm_s;
     let slips = lines.iter().filter_map(|line| line.slip_measured_mm);
@@ -35,7 +35,7 @@ pub fn crossed(run: &Summary, scenario: &Scenario) -> Check {
 }
 
 /// Whether complete logs have shown tread and friction.
-pub fn identified(scenario: &Scenario, is_complete: bool) -> Check {
+pub(crate) fn identified(scenario: &Scenario, is_complete: bool) -> Check {
     let wanted = ["tread.k_inf_pa_per_m", "tread.stiffening", "tread.tau_s", "plant.mu"];
     let by_logs = |key: &&str| scenario.sources.get(*key).is_some_and(|by| by.contains(BY));
     let shown: Vec<&str> = wanted.into_iter().filter(by_logs).collect();
@@ -45,7 +45,7 @@ pub fn identified(scenario: &Scenario, is_complete: bool) -> Check {
 }
 
 /// That a rig is what its parameters say, or the first reason why not.
-pub fn accepted(reasons: &[String]) -> Check {
+pub(crate) fn accepted(reasons: &[String]) -> Check {
     let measured = reasons.first().map_or("as its parameters say", String::as_str).to_owned();
     check("accepted", reasons.is_empty(), measured, "`rig accept` names every reason")
 }
@@ -55,7 +55,7 @@ pub fn accepted(reasons: &[String]) -> Check {
 ///
 /// # Errors
 /// A sentence: the folder has no power-up, the log is another rig's, or it cannot be written.
-pub fn record(
+pub(crate) fn record(
     folder: &Path,
     stage: Stage,
     found: Check,
@@ -103,7 +103,7 @@ fn with(rig: &Scenario, other: &Scenario) -> Result<Scenario, crate::scenario::S
 
 /// What the rig of this scenario file lacks, in a sentence: that of its folder, or of the usual one.
 /// None if it has passed every gate.
-pub fn lacking(file: Option<&Path>) -> Option<String> {
+pub(crate) fn lacking(file: Option<&Path>) -> Option<String> {
     let beside = file.and_then(Path::parent).filter(|at| at.join(STATE).exists());
     let folder = beside.unwrap_or(Path::new(FOLDER));
     let Some(progress) = Progress::open(&folder.join(STATE)) else {

@@ -88,7 +88,7 @@ impl<'p> Line<'p> {
     }
 
     /// The parameters on the board.
-    pub fn held(&mut self) -> Result<Held, StoreError> {
+    pub(crate) fn held(&mut self) -> Result<Held, StoreError> {
         self.client.held()
     }
 

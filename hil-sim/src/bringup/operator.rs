@@ -72,7 +72,7 @@ pub enum Question {
 
 impl Question {
     /// The answers with the letters that stand for them.
-    pub const fn answers(self) -> &'static [(char, Seen)] {
+    pub(crate) const fn answers(self) -> &'static [(char, Seen)] {
         match self {
             Self::Turned => &[('o', Seen::Outwards), ('i', Seen::Inwards), ('n', Seen::Nothing)],
             Self::Supplied => &[('y', Seen::Yes), ('n', Seen::Nothing)],

@@ -6,7 +6,7 @@ use crate::report::{capital, page_of};
 use crate::table::counted;
 
 /// The page; it needs no other file.
-pub fn html(progress: &Progress) -> String {
+pub(crate) fn html(progress: &Progress) -> String {
     let failed = progress.checks().filter(|check| !check.ok).count();
     let (grade, headline) = match (progress.is_complete(), failed) {
         (true, _) => ("good", "The rig is wired as it should be".to_owned()),

@@ -34,7 +34,7 @@ impl Progress {
 
     /// The progress that a file has for this rig, as it was or with what was measured; none if it
     /// is not there, or of another rig.
-    pub fn read(path: &Path, expected: &Scenario) -> Option<Self> {
+    pub(crate) fn read(path: &Path, expected: &Scenario) -> Option<Self> {
         let kept = Self::open(path)?;
         let is_this = kept.expected == *expected || kept.proposed.rig == expected.rig;
         is_this.then(|| Self { expected: expected.clone(), ..kept })
@@ -50,7 +50,7 @@ impl Progress {
     }
 
     /// Keeps it in a file.
-    pub fn write(&self, path: &Path) -> Result<(), FileError> {
+    pub(crate) fn write(&self, path: &Path) -> Result<(), FileError> {
         let (expected, proposed) = (self.expected.to_toml(), self.proposed.to_toml());
         let kept = Kept { expected, proposed, stages: self.stages.clone() };
         // Numbers and texts always have a JSON form.
@@ -85,7 +85,7 @@ impl Progress {
         self.stages.iter().flat_map(|(_, checks)| checks)
     }
 
-    pub fn stages(&self) -> &[(Stage, Vec<Check>)] {
+    pub(crate) fn stages(&self) -> &[(Stage, Vec<Check>)] {
         &self.stages
     }
 }

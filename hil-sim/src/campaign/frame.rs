@@ -12,7 +12,7 @@ use crate::table::{number, plain, width, wrapped};
 
 /// A column: the figure of each row that has its key.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Column {
+pub(crate) struct Column {
     /// Its key in JSON and CSV.
     pub key: Cow<'static, str>,
     /// Its heading; the unit follows.
@@ -23,9 +23,9 @@ pub struct Column {
 }
 
 /// As many decimals as the number has.
-pub const AS_GIVEN: usize = usize::MAX;
+pub(crate) const AS_GIVEN: usize = usize::MAX;
 
-pub const fn column(
+pub(crate) const fn column(
     key: &'static str,
     name: &'static str,
     unit: &'static str,
@@ -35,14 +35,14 @@ pub const fn column(
 }
 
 #[derive(Clone, Debug, PartialEq)]
-pub struct Frame {
+pub(crate) struct Frame {
     columns: Vec<Column>,
     rows: Vec<Map<String, Value>>,
 }
 
 impl Frame {
     /// Of rows as JSON has them.
-    pub fn of<R: Serialize>(columns: &[Column], rows: impl IntoIterator<Item = R>) -> Self {
+    pub(crate) fn of<R: Serialize>(columns: &[Column], rows: impl IntoIterator<Item = R>) -> Self {
         let row = |row: R| match serde_json::to_value(row) {
             Ok(Value::Object(row)) => row,
             _ => Map::new(),
@@ -52,7 +52,7 @@ impl Frame {
 
     /// As a table of the terminal: where that is too narrow, without as many of these keys as it
     /// takes, from the first on, which it names.
-    pub fn text(&self, spare: &[&str]) -> String {
+    pub(crate) fn text(&self, spare: &[&str]) -> String {
         let table = |without: &[&str]| {
             let mut frame = self.clone();
             frame.columns.retain(|column| !without.contains(&&*column.key));
@@ -71,7 +71,7 @@ impl Frame {
             + &if count == 0 { String::new() } else { wrapped(&note, "  ", width()) }
     }
 
-    pub fn csv(&self) -> String {
+    pub(crate) fn csv(&self) -> String {
         let mut table = csv::Writer::from_writer(Vec::new());
         let cell = |value: Option<&Value>| match value {
             None | Some(Value::Null) => String::new(),
@@ -88,7 +88,7 @@ impl Frame {
     }
 
     /// As a page with this headline, and what was printed.
-    pub fn html(&self, headline: &str, text: &str, good: bool) -> String {
+    pub(crate) fn html(&self, headline: &str, text: &str, good: bool) -> String {
         let heads: Vec<String> = self.heads(", ").map(|head| escape(&head)).collect();
         let rows = self.shown().map(|row| row.iter().map(|cell| escape(cell)).collect());
         let rows = table("ledger pairs rows", &heads, rows.collect());

@@ -5,18 +5,18 @@ use std::str::FromStr;
 
 /// Part `index` of `of`, counted from 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Shard {
+pub(crate) struct Shard {
     index: u64,
     of: u64,
 }
 
 impl Shard {
     /// All of the campaign.
-    pub const ALL: Self = Self { index: 1, of: 1 };
+    pub(crate) const ALL: Self = Self { index: 1, of: 1 };
 
     /// The places of a campaign of `count` cases that belong to this part: every n-th does, so
     /// that the parts together are all.
-    pub fn places(self, count: usize) -> Vec<usize> {
+    pub(crate) fn places(self, count: usize) -> Vec<usize> {
         (0..count).filter(|place| *place as u64 % self.of == self.index - 1).collect()
     }
 }

@@ -17,7 +17,7 @@ use crate::table::counted;
 
 /// Which part of a campaign, and how its outcome is shown.
 #[derive(Clone, Debug, clap::Args)]
-pub struct CampaignArgs {
+pub(crate) struct CampaignArgs {
     /// Only every n-th case, beginning with the i-th; with --json for `rig merge`.
     #[arg(long, value_name = "I/N", default_value_t = Shard::ALL)]
     shard: Shard,
@@ -32,7 +32,7 @@ pub struct CampaignArgs {
 
 /// How the outcome of a campaign is shown.
 #[derive(Clone, Debug, clap::Args)]
-pub struct Show {
+pub(crate) struct Show {
     /// Prints the outcome as one JSON object.
     #[arg(long)]
     json: bool,

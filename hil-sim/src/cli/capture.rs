@@ -45,7 +45,7 @@ pub struct Args {
 }
 
 /// Runs the verb.
-pub fn run(args: &Args) -> Result<Outcome, Failure> {
+pub(crate) fn run(args: &Args) -> Result<Outcome, Failure> {
     args.source.open(false, |source, scenario| write(args, source, scenario))
 }
 

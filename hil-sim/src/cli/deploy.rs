@@ -71,7 +71,7 @@ impl Args {
 }
 
 /// Runs the verb.
-pub fn run(args: &Args) -> Result<Outcome, Failure> {
+pub(crate) fn run(args: &Args) -> Result<Outcome, Failure> {
     let (scenario, directory) = args.resolve()?;
     match args.target.as_str() {
         "board" => return Err(Failure::Elsewhere(Extra::Board)),

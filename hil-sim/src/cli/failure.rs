@@ -30,7 +30,7 @@ impl Outcome {
         if good { Self::Good } else { Self::Bad }
     }
 
-    pub fn code(self) -> ExitCode {
+    pub(crate) fn code(self) -> ExitCode {
         match self {
             Self::Good => ExitCode::SUCCESS,
             Self::Bad => ExitCode::from(1),
@@ -61,7 +61,7 @@ impl Failure {
         Self::Run(error.to_string())
     }
 
-    pub fn code(&self) -> ExitCode {
+    pub(crate) fn code(&self) -> ExitCode {
         match self {
             Self::Input(_) => ExitCode::from(2),
             Self::Run(_) | Self::Elsewhere(_) => ExitCode::from(1),
@@ -79,7 +79,7 @@ impl fmt::Display for Failure {
 }
 
 /// `text` as one line: its lines trimmed and joined by blanks.
-pub fn one_line(text: &str) -> String {
+pub(crate) fn one_line(text: &str) -> String {
     let lines = text.lines().map(str::trim).filter(|line| !line.is_empty());
     lines.collect::<Vec<_>>().join(" ")
 }

@@ -75,7 +75,7 @@ impl Args {
 }
 
 /// Runs the verb.
-pub fn run(args: &Args) -> Result<Outcome, Failure> {
+pub(crate) fn run(args: &Args) -> Result<Outcome, Failure> {
     if let Some(count) = args.clean {
         return clean(args, count);
     }

@@ -49,7 +49,7 @@ pub struct Args {
 }
 
 /// Runs the verb.
-pub fn run(args: &Args) -> Result<Outcome, Failure> {
+pub(crate) fn run(args: &Args) -> Result<Outcome, Failure> {
     if !args.headless && !std::io::stdout().is_terminal() {
         return Err(Failure::input("standard output is no terminal: use --headless"));
     }

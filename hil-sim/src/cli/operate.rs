@@ -68,7 +68,7 @@ impl Verb {
 }
 
 /// Runs the verb.
-pub fn run(verb: &Verb) -> Result<Outcome, Failure> {
+pub(crate) fn run(verb: &Verb) -> Result<Outcome, Failure> {
     if verb.parts().1.target == "board" {
         return Err(Failure::Elsewhere(Extra::Board));
     }

@@ -83,7 +83,7 @@ pub(super) fn complain(error: &str) {
 }
 
 /// Prints `text`. A reader that closes the pipe early is no error.
-pub fn print(text: &str) -> Result<(), Failure> {
+pub(crate) fn print(text: &str) -> Result<(), Failure> {
     let mut out = io::stdout().lock();
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
         Err(error) if error.kind() != ErrorKind::BrokenPipe => {

@@ -95,7 +95,7 @@ struct Printed<'a> {
 }
 
 /// Runs the verb.
-pub fn run(args: &Args) -> Result<Outcome, Failure> {
+pub(crate) fn run(args: &Args) -> Result<Outcome, Failure> {
     match (&args.file, args.target.as_deref()) {
         (Some(file), _) => act(args, &mut SetFile::new(file)),
         (None, Some("probe")) => act(args, &mut Client::new(super::probe::attach(None)?)),

@@ -17,7 +17,7 @@ use crate::table::counted;
 /// the first difference, which is shown, if a part of a log cannot be run again because
 /// something before it is missing, or if the file is cut off.
 #[derive(Debug, clap::Args)]
-pub struct Args {
+pub(crate) struct Args {
     /// Logs: MCAP, CSV of rows, or bytes of the channel.
     #[arg(required = true, value_name = "LOG")]
     logs: Vec<PathBuf>,
@@ -42,7 +42,7 @@ struct Log {
 }
 
 /// Runs the verb.
-pub fn run(args: &Args) -> Result<Outcome, Failure> {
+pub(crate) fn run(args: &Args) -> Result<Outcome, Failure> {
     let mut logs = Vec::new();
     for file in &args.logs {
         let run = Run::read(file).map_err(Failure::input)?;

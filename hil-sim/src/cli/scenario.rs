@@ -29,12 +29,12 @@ pub struct ScenarioArgs {
 
 impl ScenarioArgs {
     /// The file, however it was given.
-    pub fn file(&self) -> Option<&Path> {
+    pub(crate) fn file(&self) -> Option<&Path> {
         self.scenario.as_deref().or(self.file.as_deref())
     }
 
     /// The scenario: preset, then file, then overrides.
-    pub fn resolve(&self) -> Result<Scenario, Failure> {
+    pub(crate) fn resolve(&self) -> Result<Scenario, Failure> {
         self.resolve_with(&[])
     }
 

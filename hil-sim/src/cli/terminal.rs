@@ -43,7 +43,7 @@ pub fn run(summary: &Summary, files: &[PathBuf], all: bool) -> String {
 }
 
 /// One of two runs that are compared, by its letter and its log: outcome, verdict and origin.
-pub fn one_of_two(letter: char, log: &str, summary: &Summary) -> String {
+pub(crate) fn one_of_two(letter: char, log: &str, summary: &Summary) -> String {
     let headline = wrapped(&format!("{letter}: {}", headline(summary)), "", WIDTH);
     painted(&headline, Grade::of(summary), is_coloured())
         + &wrapped(&details(summary, Some(log.to_owned())), "  ", WIDTH)

@@ -6,7 +6,7 @@ use crate::session::RunError;
 /// Reserves below the reference gap that are tried first, ascending.
 const LADDER: [f64; 5] = [0.0, 0.03, 0.06, 0.12, 0.25];
 /// How close to the reference the worst gap is tuned, relative.
-pub const TUNED_WITHIN: f64 = 0.002;
+pub(crate) const TUNED_WITHIN: f64 = 0.002;
 /// Most evaluations of one tuning.
 pub(super) const MOST_TRIES: usize = 11;
 

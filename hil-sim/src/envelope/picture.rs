@@ -7,7 +7,7 @@ use crate::report::palette;
 use crate::report::panel::{HeatCell, Marks, Panel, Shape, sheet};
 use crate::scenario::ControllerKind;
 
-pub fn picture(envelope: &Envelope) -> String {
+pub(crate) fn picture(envelope: &Envelope) -> String {
     let places = STRATEGIES.into_iter().flat_map(|kind| [true, false].map(|k| (k, kind)));
     sheet(places.map(|place| map(envelope, place)).collect(), 2, true)
 }

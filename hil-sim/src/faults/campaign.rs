@@ -27,7 +27,7 @@ pub const AFTER_S: f64 = 1.0;
 
 /// Longest run out and back, s: half of what one direction alone may take at the least useful
 /// speed, and three times the travel at cruise speed.
-pub fn longest_s(rig: &Rig) -> f64 {
+pub(crate) fn longest_s(rig: &Rig) -> f64 {
     let cruise_s = rig.rig.travel_mm / rig.drive.cruise_speed_mm_s;
     (0.5 * session::longest_s(rig)).max(3.0 * cruise_s)
 }
@@ -135,6 +135,11 @@ impl<'a> Trial<'a> {
         self.judge.finding(&self.twin.limits, self.gap_part, self.crossed)
     }
 
+    /// Which bounds of the mechanism were exceeded, in words.
+    pub fn harms(&self) -> Vec<String> {
+        self.judge.harms(self.gap_part)
+    }
+
     /// The report that counts: when, s, and its code.
     pub fn report(&self) -> Option<(f64, u16)> {
         self.judge.report(&self.twin.limits)
@@ -159,7 +164,7 @@ impl<'a> Trial<'a> {
             peak_preload_n: judge.peak_preload_n,
             motion_mm: judge.motion_mm,
             gap_part: self.gap_part,
-            harms: judge.harms(),
+            harms: self.harms(),
         }
     }
 }
@@ -175,7 +180,7 @@ pub struct FaultCampaign {
 }
 
 /// Each rig and its run without a fault.
-pub type Rigs = Vec<(Scenario, Twin)>;
+pub(crate) type Rigs = Vec<(Scenario, Twin)>;
 
 impl FaultCampaign {
     /// Runs each rig without a fault.

@@ -15,12 +15,10 @@ use crate::plant::wall::touch_mm;
 use crate::scenario::injection::{Kind, Target, entry};
 use crate::scenario::{Scenario, StepAnomaly, TICK_S};
 
-/// Part of its reference beyond which motion is uncommanded, and a constant, mm/s: half as
-/// fast again as asked is a wrong speed, but the one commanded. Chosen: just over what an encoder
-/// that reads two thirds makes of it; docs/SAFETY.md has what a part of 1 finds.
-const BEYOND: (f64, f64) = (1.6, 3.0);
-/// Gap that a run may have which reports nothing, parts of the reference gap.
-pub const GAP_PART: f64 = 1.1;
+/// Time within which 123 finds a wheel off its reference, s: two spans of the cross-check.
+const OFF_REFERENCE_S: f64 = 0.012;
+/// Gap that a run may have, parts of the reference gap.
+pub(crate) const GAP_PART: f64 = 1.1;
 /// Limits that report what the controller does about its task, not that anything is wrong.
 const OPERATIONAL: [Limit; 5] = [
     Limit::PreloadLimited,
@@ -54,6 +52,9 @@ pub enum Finding {
 struct Bounds {
     preload_n: f64,
     motion_mm: f64,
+    faster_mm_s: f64,
+    slows_mm_s2: f64,
+    gap_part: f64,
     end_mm: f64,
 }
 
@@ -65,19 +66,30 @@ impl Bounds {
     ///   in which it coasts from the largest speed with the motor's time constant,
     ///   `m v_0 / F_stall`. A wheel that slips, or is torn where it carries, may slide off the corner
     ///   it is on, by its run over that, `sqrt(R^2 - (R - h)^2)`, which no bridge can hold it on.
+    ///   It may do so again: what it loses each time is counted from the farthest place.
+    /// - Faster than its reference, along the command: what 123 lets pass of a wheel whose encoder
+    ///   is right, and never beyond the drive's speed without load. That is no harm on a wall; at
+    ///   a step the gap bounds it. The reference counts as slowing by the profile.
+    /// - Gap: as in a run that reports nothing. A wheel that slips lifts off as it slides, and the
+    ///   reference is that of the table's steps alone.
     /// - End: the room before the end stop, where a wheel ends whose encoder went wrong on the
     ///   last millimetres.
-    fn of(rig: &Rig, slips: bool) -> Self {
+    fn of(rig: &Rig, slips: bool, strange_step: bool) -> Self {
         let (preload, drive, rig_mm) = (&rig.preload, &rig.drive, &rig.rig);
         let trips_n = preload.limit_n * (1.0 + OVERPRESSURE_PART) / (1.0 - rig.sense.preload_error);
         let late_s = f64::from(OVERPRESSURE_TICKS) * TICK_S + rig.preload_latency_s();
         let mass_kg = drive.reflected_mass_kg + rig.plant.moved_mass_kg;
         let coasts_s = 1e-3 * mass_kg * drive.no_load_speed_mm_s / drive.stall_force_n;
         let run_mm = touch_mm(rig_mm.wheel_radius_mm, rig_mm.step_height_mm);
-        let stops_mm = off_reference_mm(rig) + drive.cruise_speed_mm_s * coasts_s;
+        let off_mm = off_reference_mm(rig);
+        let faster_mm_s = off_mm / OFF_REFERENCE_S;
+        let stops_mm = off_mm + drive.cruise_speed_mm_s * coasts_s;
         Self {
             preload_n: trips_n + preload.slew_n_per_s * late_s,
             motion_mm: if slips { run_mm } else { stops_mm },
+            faster_mm_s: faster_mm_s.min(drive.no_load_speed_mm_s - drive.cruise_speed_mm_s),
+            slows_mm_s2: drive.acceleration_mm_s2,
+            gap_part: if slips || strange_step { f64::INFINITY } else { GAP_PART },
             end_mm: STOP_ROOM_MM,
         }
     }
@@ -101,9 +113,13 @@ pub struct Judge {
     off_mm: f64,
     position_mm: f64,
     asked_mm_s: f64,
+    /// Distances moved since the fault came, mm: beyond what was commanded, in sum, and back from
+    /// the farthest place.
+    beyond_mm: f64,
+    behind_mm: f64,
     /// Largest preload since the fault came, N.
     pub peak_preload_n: f64,
-    /// Distance moved uncommanded since the fault came, mm.
+    /// The largest sum of both, mm.
     pub motion_mm: f64,
     /// First fault latched since the fault came: when, s, and its code.
     pub fault: Option<(f64, u16)>,
@@ -120,7 +136,7 @@ pub struct Judge {
 
 impl Judge {
     /// Before the first tick of a run.
-    pub fn new(scenario: &Scenario, truth: &Truth) -> Self {
+    pub(crate) fn new(scenario: &Scenario, truth: &Truth) -> Self {
         let fault = scenario.run.faults.first();
         let target = fault.map(|fault| fault.target);
         let reset = fault.filter(|fault| fault.target == Target::Reset);
@@ -130,7 +146,7 @@ impl Judge {
         let anomaly = scenario.run.anomalies.first().map(StepAnomaly::codes);
         let codes = entry.map(|entry| entry.codes).or(anomaly);
         Self {
-            bounds: Bounds::of(&scenario.rig, slips),
+            bounds: Bounds::of(&scenario.rig, slips, !scenario.run.anomalies.is_empty()),
             codes,
             ends_mm: (0.0, scenario.rig.rig.travel_mm),
             position_mm: truth.position_mm,
@@ -148,12 +164,12 @@ impl Judge {
         self.mode = output.telemetry.mode;
         // The wheel follows the reference with a lag: the recent maximum counts.
         let asked = f64::from(output.telemetry.speed_ref.to_bits()) / 65_536.0;
-        self.asked_mm_s = asked.abs().max(self.asked_mm_s - 250.0 * TICK_S);
+        self.asked_mm_s = asked.abs().max(self.asked_mm_s - self.bounds.slows_mm_s2 * TICK_S);
         if !active {
             return;
         }
         self.peak_preload_n = self.peak_preload_n.max(truth.preload_n);
-        self.motion_mm += self.uncommanded(moves_mm_s * TICK_S);
+        self.count(moves_mm_s * TICK_S);
         if let Mode::Complete(direction) = self.mode {
             let (stow_mm, end_mm) = self.ends_mm;
             let end_mm = if direction == Direction::Deploy { end_mm } else { stow_mm };
@@ -173,20 +189,22 @@ impl Judge {
         self.rest_s = (off && still).then(|| self.rest_s.unwrap_or(t_s));
     }
 
-    /// Distance of a tick that was not commanded, mm.
-    fn uncommanded(&self, moved_mm: f64) -> f64 {
-        let direction = match self.mode {
-            Mode::Run(direction, _) | Mode::Stopping(direction) => direction,
-            _ => return moved_mm.abs(),
-        };
-        let along = f64::from(direction.sign()) * moved_mm;
-        let most = (BEYOND.0 * self.asked_mm_s + BEYOND.1) * TICK_S;
-        let back = BEYOND.1 * TICK_S;
-        (along - most).max(-along - back).max(0.0)
+    /// Counts what was not commanded of the motion of a tick, mm.
+    fn count(&mut self, moved_mm: f64) {
+        if let Mode::Run(direction, _) | Mode::Stopping(direction) = self.mode {
+            let along = f64::from(direction.sign()) * moved_mm;
+            let most = (self.asked_mm_s + self.bounds.faster_mm_s) * TICK_S;
+            self.beyond_mm += (along - most).max(0.0);
+            self.behind_mm = (self.behind_mm - along).max(0.0);
+        } else {
+            self.beyond_mm += moved_mm.abs();
+        }
+        self.motion_mm = self.motion_mm.max(self.beyond_mm + self.behind_mm);
     }
 
-    /// Which bounds of the mechanism were exceeded, in words; empty if it was safe.
-    pub fn harms(&self) -> Vec<String> {
+    /// Which bounds of the mechanism were exceeded, in words; empty if it was safe. `gap_part` is
+    /// the largest gap over the reference.
+    pub(crate) fn harms(&self, gap_part: f64) -> Vec<String> {
         let mut harms = Vec::new();
         let most = self.bounds.preload_n;
         if self.peak_preload_n > most {
@@ -195,6 +213,9 @@ impl Judge {
         if self.motion_mm > self.bounds.motion_mm {
             let (moved, most) = (self.motion_mm, self.bounds.motion_mm);
             harms.push(format!("{moved:.2} mm uncommanded, at most {most:.2}"));
+        }
+        if gap_part > self.bounds.gap_part {
+            harms.push(format!("gap {gap_part:.2} of the reference"));
         }
         if self.off_mm > self.bounds.end_mm {
             harms.push(format!("{:.1} mm from the end it says it reached", self.off_mm));
@@ -208,7 +229,7 @@ impl Judge {
     /// What became of the fault. `known` are the limits of the same run without it,
     /// `gap_part` the largest gap over the reference, `crossed` whether every step was
     /// crossed; a stop on command is as good an end as arrival.
-    pub fn finding(&self, known: &[u16], gap_part: f64, crossed: bool) -> Finding {
+    pub(crate) fn finding(&self, known: &[u16], gap_part: f64, crossed: bool) -> Finding {
         let ended = match self.mode {
             Mode::Complete(_) => crossed || self.commanded,
             _ => self.mode.is_at_rest(),
@@ -223,7 +244,7 @@ impl Judge {
             Finding::Limited
         } else if self.report(known).is_some() {
             Finding::Otherwise
-        } else if ended && self.harms().is_empty() && gap_part <= GAP_PART {
+        } else if ended && self.harms(gap_part).is_empty() && gap_part <= GAP_PART {
             Finding::Tolerated
         } else {
             Finding::Undetected
@@ -257,7 +278,7 @@ impl Judge {
 
     /// The report that counts, when, s, and its code: the fault or else the first limit, one that
     /// names what was injected before others.
-    pub fn report(&self, known: &[u16]) -> Option<(f64, u16)> {
+    pub(crate) fn report(&self, known: &[u16]) -> Option<(f64, u16)> {
         let all = || self.fault.into_iter().chain(self.new_limits(known));
         all().find(|(_, code)| self.names(*code)).or(all().next())
     }
@@ -306,9 +327,10 @@ mod tests {
 
     #[test]
     fn motion_is_uncommanded_beyond_its_reference_against_it_and_at_rest() {
-        assert!(judged(RUN, 8.0, 15.7, 40.0, 1000).motion_mm < 1e-9);
-        assert!((judged(RUN, 8.0, 25.8, 40.0, 100).motion_mm - 1.0).abs() < 0.01);
-        assert!((judged(RUN, 8.0, -8.0, 40.0, 100).motion_mm - 0.5).abs() < 0.01);
+        // 0.11 mm and 2 counts in 12 ms are 12.36 mm/s.
+        assert!(judged(RUN, 8.0, 20.3, 40.0, 1000).motion_mm < 1e-9);
+        assert!((judged(RUN, 8.0, 30.36, 40.0, 100).motion_mm - 1.0).abs() < 0.01);
+        assert!((judged(RUN, 8.0, -8.0, 40.0, 100).motion_mm - 0.8).abs() < 0.01);
         let hold = Mode::FaultHold(Fault::DriveStalled);
         assert!((judged(hold, 0.0, 1.0, 40.0, 100).motion_mm - 0.1).abs() < 1e-9);
     }
@@ -317,12 +339,17 @@ mod tests {
     fn a_harm_is_named() {
         let hold = Mode::FaultHold(Fault::Overpressure);
         // 1.1 of 50 N by a sensor that reads 1.5 % too little, and 25 N/s for 10, 80 and 60 ms.
-        assert!(judged(hold, 0.0, 0.0, 59.5, 10).harms().is_empty());
-        assert!(judged(hold, 0.0, 0.0, 59.7, 10).harms()[0].starts_with("preload 59.7 N"));
-        assert!(judged(RUN, 8.0, 8.0, 40.0, 10).harms()[0].starts_with("not at rest"));
+        assert!(judged(hold, 0.0, 0.0, 59.5, 10).harms(1.0).is_empty());
+        assert!(judged(hold, 0.0, 0.0, 59.7, 10).harms(1.0)[0].starts_with("preload 59.7 N"));
+        assert!(judged(RUN, 8.0, 8.0, 40.0, 10).harms(1.0)[0].starts_with("not at rest"));
+        assert_eq!(judged(hold, 0.0, 0.0, 40.0, 10).harms(1.11), ["gap 1.11 of the reference"]);
         let there = Mode::Complete(Direction::Deploy);
-        assert!(judged(there, 0.0, 0.0, 40.0, 10).harms()[0].starts_with("80.0 mm from the end"));
-        assert!(judged(Mode::Complete(Direction::Retract), 0.0, 0.0, 40.0, 10).harms().is_empty());
+        assert!(
+            judged(there, 0.0, 0.0, 40.0, 10).harms(1.0)[0].starts_with("80.0 mm from the end")
+        );
+        assert!(
+            judged(Mode::Complete(Direction::Retract), 0.0, 0.0, 40.0, 10).harms(1.0).is_empty()
+        );
     }
 
     #[test]

@@ -14,14 +14,14 @@ use crate::scenario::Scenario;
 /// Name of the active set.
 pub const KEPT: &str = "kept";
 /// Name of the one before it.
-pub const SPARE: &str = "spare";
+pub(crate) const SPARE: &str = "spare";
 /// Name of the set that is saved.
 pub const SAVED: &str = "saved";
 
 /// Number of the active set, which is in the first slot.
 const SEQUENCE: u32 = 7;
 /// Bits before a set in its slot.
-pub const PREFIX_BITS: u32 = 2 * 8 * WORD_BYTES as u32;
+pub(crate) const PREFIX_BITS: u32 = 2 * 8 * WORD_BYTES as u32;
 /// Additional preload of the others, N.
 const MORE_N: f64 = 1.0 / 64.0;
 
@@ -45,13 +45,13 @@ pub fn places(scenario: &Scenario) -> Result<Vec<u8>, CompileError> {
 }
 
 /// Bits of a set of this many bytes, and of its seal and length where it is stored.
-pub const fn bits(length: usize, stored: bool) -> u32 {
+pub(crate) const fn bits(length: usize, stored: bool) -> u32 {
     8 * length as u32 + if stored { PREFIX_BITS } else { 0 }
 }
 
 /// Operations of the flash in a save of this many bytes: it erases, writes the set, its length
 /// and its seal.
-pub const fn operations(length: usize) -> u32 {
+pub(crate) const fn operations(length: usize) -> u32 {
     (SLOT_BYTES / PAGE_BYTES + length.div_ceil(WORD_BYTES) + 2) as u32
 }
 

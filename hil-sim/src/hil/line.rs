@@ -7,7 +7,7 @@ use interstage::params::link::{FrameReader, frame};
 use interstage::units::Tick;
 
 use super::HilError;
-use crate::probe::Port;
+use crate::probe::{Port, exchange};
 
 /// Time after which a request is repeated: well below the board's own timeout of 50 ms.
 const RETRY: Duration = Duration::from_millis(10);
@@ -69,40 +69,8 @@ impl<'a> HostLine<'a> {
     ) -> Result<Option<ToHost>, HilError> {
         // Every message fits.
         let Some(bytes) = frame(message) else { return Ok(None) };
-        let since = self.port.now();
-        let mut sent = since;
-        let mut left = bytes.as_slice();
-        while self.port.now().saturating_sub(since) < TIMEOUT {
-            if left.is_empty() && self.port.now() >= sent + RETRY {
-                left = bytes.as_slice();
-            }
-            if !left.is_empty() {
-                left = &left[self.port.down(DOWN, left)?..];
-                sent = self.port.now();
-            }
-            self.port.pass()?;
-            for byte in self.port.up(UP)? {
-                if let Some(answer) = self.gatherer.take(byte)
-                    && answers(&answer)
-                {
-                    return Ok(Some(answer));
-                }
-            }
-        }
-        Ok(None)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::probe::Mute;
-
-    #[test]
-    fn a_slow_probe_does_not_stretch_the_timeout() {
-        let mut port = Mute::new();
-        let state = HostLine::begin_at(&mut port).state();
-        assert!(matches!(state, Err(HilError::NoAnswer)));
-        assert!(port.now() < TIMEOUT + Duration::from_millis(20), "{:?}", port.now());
+        let picked = |answer| answers(&answer).then_some(answer);
+        let times = (RETRY, TIMEOUT);
+        Ok(exchange(self.port, &mut self.gatherer, (DOWN, UP), &bytes, times, picked)?)
     }
 }

@@ -176,7 +176,7 @@ fn judged(
 }
 
 /// A number as a table shows it.
-pub fn brief(value: f64) -> String {
+pub(crate) fn brief(value: f64) -> String {
     if value.abs() >= 1e4 { format!("{value:.3e}") } else { number(value, 3) }
 }
 

@@ -41,7 +41,7 @@ const LEAST_N: f64 = 1e-4;
 
 /// The result.
 #[derive(Clone, Debug)]
-pub struct Actuator {
+pub(crate) struct Actuator {
     /// Coordinates.
     pub x: Vec<f64>,
     pub covariance: DMatrix<f64>,
@@ -172,7 +172,7 @@ impl Model for Screw<'_> {
 
 /// Fits the pre-tightener to records whose contact is known, then once more with the noise
 /// that this leaves.
-pub fn fit(
+pub(crate) fn fit(
     records: &[Record],
     runs: &[Run],
     trajectories: &[Trajectory],

@@ -35,7 +35,7 @@ const KEPT: f64 = 0.5;
 
 /// The result.
 #[derive(Clone, Debug)]
-pub struct Contact {
+pub(crate) struct Contact {
     /// Coordinates.
     pub x: Vec<f64>,
     pub covariance: DMatrix<f64>,
@@ -134,7 +134,7 @@ impl Model for Weighted<'_> {
 }
 
 /// Fits the coordinates to the runs, then twice more with the noise that this leaves.
-pub fn fit(runs: &[Run], coordinates: &Coordinates) -> Result<Contact, IdentifyError> {
+pub(crate) fn fit(runs: &[Run], coordinates: &Coordinates) -> Result<Contact, IdentifyError> {
     let start: Vec<f64> = coordinates.priors().iter().map(|prior| prior.mean).collect();
     // Friction shows in the creep, and only once the rest is in place.
     let held = coordinates.known(FRICTION, start[FRICTION], HELD_LN);

@@ -17,20 +17,20 @@ use crate::scenario::Scenario;
 // Places in [`ROWS`].
 pub(crate) const STIFFNESS: usize = 0;
 pub(crate) const STIFFENING: usize = 1;
-pub const TAU: usize = 2;
-pub const FRICTION: usize = 3;
-pub const LOAD: usize = 4;
+pub(crate) const TAU: usize = 2;
+pub(crate) const FRICTION: usize = 3;
+pub(crate) const LOAD: usize = 4;
 pub(crate) const GEARBOX: usize = 5;
-pub const RADIUS: usize = 6;
+pub(crate) const RADIUS: usize = 6;
 pub(crate) const LOAD_GAIN: usize = 7;
 pub(crate) const TREAD_GAIN: usize = 8;
 pub(crate) const CREEP: usize = 9;
-pub const DRIVE: usize = 10;
+pub(crate) const DRIVE: usize = 10;
 pub(crate) const NO_LOAD: usize = 11;
 pub(crate) const ARM_ZERO: usize = 12;
 /// First of the steps: all positions as the wheel's turn has them at its nominal radius,
 /// mm, so that a wheel of another radius meets them at the same turn; then all heights, mm.
-pub const STEPS: usize = 13;
+pub(crate) const STEPS: usize = 13;
 
 /// Deviation of what only the logs can show: a factor of two (one standard
 /// deviation), and lengths, forces and angles beyond any tolerance.
@@ -58,7 +58,7 @@ const EXACT: f64 = 1e-6;
 
 /// Mean and standard deviation of a coordinate before any log is read.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Prior {
+pub(crate) struct Prior {
     pub mean: f64,
     /// Standard deviation.
     pub deviation: f64,
@@ -206,7 +206,7 @@ const fn known(mean: f64, deviation: f64) -> Prior {
 
 /// Meaning of the coordinates for one rig.
 #[derive(Clone, Debug)]
-pub struct Coordinates {
+pub(crate) struct Coordinates {
     nominal: PlantParameters,
     steps: usize,
     priors: Vec<Prior>,
@@ -215,7 +215,7 @@ pub struct Coordinates {
 impl Coordinates {
     /// The coordinates of a rig of which only what the scenario states is known; the
     /// tolerances of sensors and wheel are those of its `spread`.
-    pub fn of(scenario: &Scenario) -> Self {
+    pub(crate) fn of(scenario: &Scenario) -> Self {
         let mut exact = scenario.clone();
         exact.spread = Spread::default();
         // A log of the virtual rig holds what its controller was not told: it is not known here.
@@ -238,7 +238,7 @@ impl Coordinates {
     }
 
     /// The same with one coordinate known otherwise, to this deviation.
-    pub fn known(&self, index: usize, mean: f64, deviation: f64) -> Self {
+    pub(crate) fn known(&self, index: usize, mean: f64, deviation: f64) -> Self {
         let mut known = self.clone();
         known.priors[index] = Prior { mean, deviation, tolerance: false };
         known
@@ -246,34 +246,34 @@ impl Coordinates {
 
     /// Adds the place where a run begins that an earlier one has ended, mm from where it should;
     /// returns its coordinate.
-    pub fn add_start(&mut self) -> usize {
+    pub(crate) fn add_start(&mut self) -> usize {
         self.priors.push(Prior { mean: 0.0, deviation: START_MM, tolerance: true });
         self.priors.len() - 1
     }
 
     /// Number of steps.
-    pub const fn steps(&self) -> usize {
+    pub(crate) const fn steps(&self) -> usize {
         self.steps
     }
 
     /// Coordinate of a step's position.
-    pub const fn position(&self, step: usize) -> usize {
+    pub(crate) const fn position(&self, step: usize) -> usize {
         STEPS + step
     }
 
     /// Coordinates of all steps.
-    pub const fn of_steps(&self) -> Range<usize> {
+    pub(crate) const fn of_steps(&self) -> Range<usize> {
         STEPS..STEPS + 2 * self.steps
     }
 
     /// Coordinate of a step's height.
-    pub const fn height(&self, step: usize) -> usize {
+    pub(crate) const fn height(&self, step: usize) -> usize {
         STEPS + self.steps + step
     }
 
     /// The plant that these numbers describe, for the forward model: its preload comes
     /// from the log, so that it has no spring; its modes are averaged out of the log.
-    pub fn plant(&self, x: &[f64]) -> PlantParameters {
+    pub(crate) fn plant(&self, x: &[f64]) -> PlantParameters {
         let k_inf = x[STIFFNESS].exp();
         let scale = self.scale(x);
         let steps = (0..self.steps).map(|step| Step {
@@ -300,12 +300,12 @@ impl Coordinates {
     }
 
     /// Travel over the travel at the nominal radius.
-    pub fn scale(&self, x: &[f64]) -> f64 {
+    pub(crate) fn scale(&self, x: &[f64]) -> f64 {
         x[RADIUS] / self.nominal.ring.radius_mm
     }
 
     /// Position of a step, mm, and its variance by this covariance.
-    pub fn place(&self, step: usize, x: &[f64], covariance: &DMatrix<f64>) -> (f64, f64) {
+    pub(crate) fn place(&self, step: usize, x: &[f64], covariance: &DMatrix<f64>) -> (f64, f64) {
         let (index, scale) = (self.position(step), self.scale(x));
         let by_radius = x[index] / self.nominal.ring.radius_mm;
         let variance = scale * scale * covariance[(index, index)]
@@ -315,7 +315,7 @@ impl Coordinates {
     }
 
     /// The rig as stated, without mismatch.
-    pub const fn nominal(&self) -> &PlantParameters {
+    pub(crate) const fn nominal(&self) -> &PlantParameters {
         &self.nominal
     }
 }

@@ -29,7 +29,7 @@ const DRIVE_LOAD: usize = 2;
 
 /// What the forward model gives, every few ticks, or a change of it.
 #[derive(Clone, Debug)]
-pub struct Trajectory {
+pub(crate) struct Trajectory {
     first: usize,
     series: [Vec<f64>; 3],
     /// Largest friction utilisation.
@@ -40,7 +40,7 @@ pub struct Trajectory {
 
 /// A record with what the forward model needs of it.
 #[derive(Clone, Debug)]
-pub struct Run {
+pub(crate) struct Run {
     /// Where it begins, mm.
     start_mm: f64,
     /// Coordinate of how far that is off, if it begins as an earlier run has ended: pressed, and
@@ -56,10 +56,10 @@ pub struct Run {
 
 /// What is compared, one value a used bin: compression, mm, arm angle, mrad, and drive
 /// effort, N.
-pub type Channels = [Vec<f64>; 3];
+pub(crate) type Channels = [Vec<f64>; 3];
 
 /// Names of the channels, with their units.
-pub const CHANNELS: [(&str, &str); 3] =
+pub(crate) const CHANNELS: [(&str, &str); 3] =
     [("compression", "mm"), ("arm angle", "mrad"), ("drive effort", "N")];
 
 /// `of` of each pair of values.
@@ -74,7 +74,7 @@ pub(super) fn quotient(a: &Channels, b: &Channels, over: f64) -> Channels {
 
 impl Run {
     /// Prepares a record.
-    pub fn of(
+    pub(crate) fn of(
         record: &Record,
         coordinates: &mut Coordinates,
     ) -> Result<Self, super::IdentifyError> {
@@ -119,7 +119,7 @@ impl Run {
     }
 
     /// What the sensors would have shown in the used bins.
-    pub fn predicted(&self, of: &Trajectory, x: &[f64]) -> Channels {
+    pub(crate) fn predicted(&self, of: &Trajectory, x: &[f64]) -> Channels {
         let (plant, radius) = (&self.nominal, x[RADIUS]);
         let compression = |bin: &Bin| {
             of.mean(COMPRESSION, &bin.ticks, self.compression_delay) * x[TREAD_GAIN].exp()
@@ -142,13 +142,13 @@ impl Run {
     }
 
     /// What the sensors did show there.
-    pub fn measured(&self) -> Channels {
+    pub(crate) fn measured(&self) -> Channels {
         let stall_n = self.nominal.drive.stall_n;
         self.used(|bin| bin.compression_mm, |_, arm| 1e3 * arm, |effort| stall_n * effort.duty)
     }
 
     /// Times of the values of each channel, s.
-    pub fn times(&self) -> Channels {
+    pub(crate) fn times(&self) -> Channels {
         let mid = |ticks: &Range<usize>| 0.5e-3 * (ticks.start + ticks.end) as f64;
         self.used(|bin| mid(&bin.ticks), |bin, _| mid(&bin.ticks), |effort| mid(&effort.ticks))
     }
@@ -189,7 +189,7 @@ impl Trajectory {
     }
 
     /// Height of the centre above the outermost wall at a tick, mm.
-    pub fn height_mm(&self, tick: f64) -> f64 {
+    pub(crate) fn height_mm(&self, tick: f64) -> f64 {
         self.at(HEIGHT, tick)
     }
 

@@ -18,7 +18,7 @@ pub(super) const NEAR: f64 = 1e-4;
 const MOST_EVALUATIONS: usize = 30;
 
 /// What is fitted.
-pub trait Model {
+pub(crate) trait Model {
     /// The model's values at a point, shared by residuals and derivatives.
     type At;
     /// Evaluates the model; none where it has no value.
@@ -31,7 +31,7 @@ pub trait Model {
 
 /// The minimum.
 #[derive(Clone, Debug)]
-pub struct Fitted<A> {
+pub(crate) struct Fitted<A> {
     /// Coordinates.
     pub x: Vec<f64>,
     /// The model there.
@@ -145,7 +145,7 @@ pub(crate) fn robust(
 /// Standard deviation about zero of residuals, and how much their correlation adds to the
 /// variance of a mean.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Noise {
+pub(crate) struct Noise {
     /// Root mean square.
     pub deviation: f64,
     /// Variance of a mean over that of as many independent ones, at least 1.
@@ -156,7 +156,7 @@ impl Noise {
     /// Of residuals in order of time. The inflation is the integrated autocorrelation
     /// 1 + 2 sum rho_k, summed until it no longer grows faster than a fifth of the lags
     /// summed (Sokal's window), at most a third of the residuals.
-    pub fn of(residuals: &[f64]) -> Self {
+    pub(crate) fn of(residuals: &[f64]) -> Self {
         let n = residuals.len();
         let square: f64 = residuals.iter().map(|r| r * r).sum();
         if n < 3 || square == 0.0 {
@@ -174,7 +174,7 @@ impl Noise {
     }
 
     /// Standard deviation of independent residuals with the same variance of the mean.
-    pub fn effective(&self) -> f64 {
+    pub(crate) fn effective(&self) -> f64 {
         self.deviation * self.inflation.sqrt()
     }
 }

@@ -9,7 +9,7 @@ use crate::report::panel::{Look, Marks, Panel, Shape, sheet};
 /// Half-width of the band, standard deviations.
 const NORMAL_95: f64 = 1.96;
 
-pub fn svg(rows: &[&Residuals]) -> String {
+pub(crate) fn svg(rows: &[&Residuals]) -> String {
     let times = rows.iter().flat_map(|row| row.series.iter().map(|(t, _)| *t));
     let x = padded(extent(times).unwrap_or((0.0, 1.0)), 0.01);
     let panel = |row: &&Residuals| Panel {

@@ -124,7 +124,7 @@ impl Record {
     }
 
     /// Whether the wheel goes out, onto the smaller radius.
-    pub fn deploys(&self) -> bool {
+    pub(crate) fn deploys(&self) -> bool {
         self.scenario.run.direction == Direction::Deploy
     }
 

@@ -29,7 +29,7 @@ const TICK_VARIANCE: f64 = 1.0 / 12.0;
 const NOTHING: &str = "not in these logs";
 
 /// What stands between interval and logs in the source of a value that identification has found.
-pub const BY: &str = ", identified from ";
+pub(crate) const BY: &str = ", identified from ";
 
 /// A parameter with its interval: a rig's values are all within theirs with 95 %.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -64,7 +64,7 @@ impl Parameter {
     }
 
     /// Its interval in words.
-    pub fn interval(&self) -> String {
+    pub(crate) fn interval(&self) -> String {
         let width = self.high.zip(self.low).map_or(0.0, |(high, low)| high - low);
         let end = |end: Option<f64>| end.map_or("-".to_owned(), |end| figures(end, width));
         format!("{} to {}", end(self.low), end(self.high))
@@ -379,7 +379,7 @@ impl Identification {
     }
 
     /// The scenario file, which has the source of each identified value.
-    pub fn to_toml(&self) -> String {
+    pub(crate) fn to_toml(&self) -> String {
         "# One height is that of all steps; sensors' zeros are taken again at each start.\n"
             .to_owned()
             + &self.scenario.to_toml()
@@ -387,7 +387,7 @@ impl Identification {
 }
 
 /// As many decimals as the interval's width asks for; of large numbers five digits.
-pub fn figures(value: f64, width: f64) -> String {
+pub(crate) fn figures(value: f64, width: f64) -> String {
     if value.abs() >= 1e6 {
         return format!("{value:.4e}");
     }

@@ -50,7 +50,7 @@ const MOST_PART_OF_LIMIT: f64 = 0.95;
 
 /// A zero of a sensor: mean over the unloaded rig, and its standard error.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Zero {
+pub(crate) struct Zero {
     /// Reading of the unloaded sensor.
     pub value: f64,
     /// Standard error of it.
@@ -61,7 +61,7 @@ pub struct Zero {
 
 /// Mean of a channel over a bin.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Bin {
+pub(crate) struct Bin {
     pub ticks: Range<usize>,
     /// Compression without its zero, mm.
     pub compression_mm: f64,
@@ -77,7 +77,7 @@ pub struct Bin {
 
 /// What the drive did over a bin.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Effort {
+pub(crate) struct Effort {
     pub ticks: Range<usize>,
     /// Mean duty.
     pub duty: f64,
@@ -91,7 +91,7 @@ pub struct Effort {
 
 /// A prepared record.
 #[derive(Clone, Debug)]
-pub struct Traces {
+pub(crate) struct Traces {
     /// Ticks that are compared: from the first preload to the last drive.
     pub span: Range<usize>,
     /// Rotation since the start, rad, every tick.
@@ -112,7 +112,7 @@ pub struct Traces {
 
 impl Traces {
     /// Prepares a record.
-    pub fn of(record: &Record) -> Result<Self, IdentifyError> {
+    pub(crate) fn of(record: &Record) -> Result<Self, IdentifyError> {
         let bad = |why: &str| IdentifyError::Log(record.name.clone(), why.into());
         let samples = &record.samples;
         let pressed = samples.iter().position(|s| s.pretightener_on);
@@ -149,7 +149,7 @@ impl Traces {
     }
 
     /// Whether it begins with a preload, as an earlier run has left it.
-    pub const fn is_loaded(&self) -> bool {
+    pub(crate) const fn is_loaded(&self) -> bool {
         self.preload_zero.count == 0
     }
 

@@ -32,7 +32,7 @@ const KEYS: &str =
     " s start   SPACE or x stop   r retract   0 reset   q quit: a real drive runs on ";
 
 /// What the log is compared with.
-pub struct Known {
+pub(crate) struct Known {
     geometry: Geometry,
     /// Reference gap in each direction, mm.
     gap_ref_mm: [f64; 2],
@@ -42,7 +42,7 @@ pub struct Known {
 
 impl Known {
     /// The rig that the target is said to have.
-    pub fn of(rig: &Rig) -> Result<Self, RigError> {
+    pub(crate) fn of(rig: &Rig) -> Result<Self, RigError> {
         let planner = Planner::try_build(rig)?;
         Ok(Self {
             geometry: Geometry::of_rig(rig),
@@ -53,7 +53,7 @@ impl Known {
 }
 
 /// The state of the terminal.
-pub struct Screen {
+pub(crate) struct Screen {
     known: Known,
     /// Where the log goes: address, files.
     places: String,
@@ -68,7 +68,7 @@ pub struct Screen {
 
 impl Screen {
     /// Before the first item. `places` says where the log goes.
-    pub fn new(known: Known, places: String) -> Self {
+    pub(crate) fn new(known: Known, places: String) -> Self {
         Self {
             known,
             places,
@@ -81,7 +81,7 @@ impl Screen {
         }
     }
 
-    pub fn see(&mut self, item: &Item) {
+    pub(crate) fn see(&mut self, item: &Item) {
         self.view.see(item);
         match item {
             Item::Tick(record, sensors) => {
@@ -137,7 +137,7 @@ impl Screen {
     }
 
     /// Shows a line about the connection.
-    pub fn note(&mut self, text: String) {
+    pub(crate) fn note(&mut self, text: String) {
         self.add(Color::LightRed, text);
     }
 
@@ -148,11 +148,11 @@ impl Screen {
         }
     }
 
-    pub fn count(&mut self, counts: &Counts) {
+    pub(crate) fn count(&mut self, counts: &Counts) {
         self.view.count(counts);
     }
 
-    pub fn draw(&self, frame: &mut Frame<'_>, counts: &Counts) {
+    pub(crate) fn draw(&self, frame: &mut Frame<'_>, counts: &Counts) {
         let Rect { width, height, .. } = frame.area();
         let log_lines = if height < WIDE.1 { 4 } else { 10 };
         let [head, plots, log, keys] = Layout::vertical([

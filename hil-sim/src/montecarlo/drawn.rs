@@ -9,7 +9,7 @@ use crate::scenario::{MismatchDraw, Scenario};
 /// A key that differs from run to run, or by which the runs differ from the rig that the
 /// controller knows.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Drawn {
+pub(crate) struct Drawn {
     pub key: String,
     /// Least value over the runs.
     pub least: f64,

@@ -7,7 +7,7 @@ use crate::scenario::Scenario;
 
 /// Median, 95th and 99th percentile and maximum of a figure over the runs that have it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Quantiles {
+pub(crate) struct Quantiles {
     pub p50: f64,
     pub p95: f64,
     pub p99: f64,
@@ -18,7 +18,7 @@ pub struct Quantiles {
 
 /// Least of a figure over the runs that have it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Least {
+pub(crate) struct Least {
     pub min: f64,
     /// Its seed; the lowest of several.
     pub seed: u64,
@@ -26,7 +26,7 @@ pub struct Least {
 
 /// A fault or failure, and in which run.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct SeedReport {
+pub(crate) struct SeedReport {
     pub seed: u64,
     /// The fault's code; none if the plant failed.
     pub code: Option<u16>,
@@ -35,7 +35,7 @@ pub struct SeedReport {
 
 /// How many runs met a limit.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct LimitCount {
+pub(crate) struct LimitCount {
     pub code: u16,
     pub text: &'static str,
     /// Runs in which it occurred.
@@ -44,7 +44,7 @@ pub struct LimitCount {
 
 /// How far from the true face of a step the controller recorded it, mm.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct StepFound {
+pub(crate) struct StepFound {
     /// Step number, from 1.
     pub index: u8,
     /// Runs in which it was found.
@@ -55,7 +55,7 @@ pub struct StepFound {
 
 /// A campaign; `rig montecarlo --json` prints it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Outcome {
+pub(crate) struct Outcome {
     pub runs: usize,
     /// Runs that reached the end of travel with every step crossed and no fault.
     pub completed: usize,
@@ -103,7 +103,7 @@ pub struct Outcome {
 
 impl Outcome {
     /// The campaign of these runs.
-    pub fn of(lines: &[RunLine]) -> Self {
+    pub(crate) fn of(lines: &[RunLine]) -> Self {
         let figure = |pick: &dyn Fn(&RunLine) -> Option<f64>| -> Vec<(f64, u64)> {
             lines.iter().filter_map(|line| Some((pick(line)?, line.seed))).collect()
         };
@@ -138,7 +138,7 @@ impl Outcome {
     }
 
     /// The same with what these seeds of the scenario draw.
-    pub fn drawn_from(self, scenario: &Scenario, seeds: &[u64]) -> Self {
+    pub(crate) fn drawn_from(self, scenario: &Scenario, seeds: &[u64]) -> Self {
         Self { drawn: drawn::mismatch(scenario, seeds), ..self }
     }
 }

@@ -4,7 +4,7 @@
 /// Hooke and Jeeves' exploratory moves: each variable is moved by its step in both senses from
 /// the best place so far; a round without gain halves the steps, and after this many halvings it
 /// ends. `try_move` gets the changes of all variables, and returns whether it kept them.
-pub fn pattern_search<const N: usize>(
+pub(crate) fn pattern_search<const N: usize>(
     steps: &[f64; N],
     halvings: usize,
     mut try_move: impl FnMut(&[f64; N]) -> bool,
@@ -41,7 +41,7 @@ type Known = (f64, f64);
 /// Looks for the largest x in `range` at which `excess`, which rises with x, is not positive:
 /// by secants from `guess`, between the ends that are known. Calls `excess` at most `tries`
 /// times, and stops early within a thousandth below zero.
-pub fn largest_below<E>(
+pub(crate) fn largest_below<E>(
     (low, high): (f64, f64),
     guess: f64,
     tries: usize,

@@ -6,7 +6,7 @@ use interstage::params::link::{FrameReader, ToBoard, ToHost, frame};
 use interstage::params::service::{Description, Origin, PIECE, Piece, Request, Response};
 
 use super::{Held, Store, StoreError};
-use crate::probe::Port;
+use crate::probe::{Port, exchange};
 
 /// Timeout of an answer: erasing takes 50 ms.
 const TIMEOUT: Duration = Duration::from_secs(1);
@@ -41,26 +41,16 @@ impl<P: Port> Client<P> {
         self.number = self.number.wrapping_add(1);
         let message = ToBoard::Parameters(self.number, request);
         let bytes = frame(&message).ok_or(StoreError::Answer)?;
-        let mut left = bytes.as_slice();
-        let since = self.port.now();
-        while self.port.now().saturating_sub(since) < TIMEOUT {
-            left = &left[self.port.down(DOWN, left)?..];
-            self.port.pass()?;
-            for byte in self.port.up(UP)? {
-                match self.gatherer.take(byte) {
-                    Some(ToHost::Parameters(number, response)) if number == self.number => {
-                        return match response {
-                            Response::Refused(refusal) => {
-                                Err(StoreError::Refused(refusal.sentence()))
-                            }
-                            response => Ok(response),
-                        };
-                    }
-                    _ => {}
-                }
-            }
+        let own = |answer| match answer {
+            ToHost::Parameters(number, response) if number == self.number => Some(response),
+            _ => None,
+        };
+        let (lines, times) = ((DOWN, UP), (TIMEOUT, TIMEOUT));
+        match exchange(&mut self.port, &mut self.gatherer, lines, &bytes, times, own)? {
+            Some(Response::Refused(refusal)) => Err(StoreError::Refused(refusal.sentence())),
+            Some(response) => Ok(response),
+            None => Err(StoreError::Silent { seconds: TIMEOUT.as_secs_f64() }),
         }
-        Err(StoreError::Silent { seconds: TIMEOUT.as_secs_f64() })
     }
 
     fn done(&mut self, request: Request) -> Result<(), StoreError> {
@@ -76,10 +66,6 @@ impl<P: Port> Client<P> {
             Response::Description(description) => Ok(description),
             _ => Err(StoreError::Answer),
         }
-    }
-
-    pub fn restart(&mut self) -> Result<(), StoreError> {
-        self.done(Request::Restart)
     }
 
     fn read(&mut self, length: usize) -> Result<Vec<u8>, StoreError> {

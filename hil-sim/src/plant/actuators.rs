@@ -23,7 +23,7 @@ pub struct DriveMotor {
 
 /// What the drive does in a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Turn {
+pub(crate) struct Turn {
     /// Tread speed at its end if nothing resists, mm/s.
     pub free_mm_s: f64,
     /// What a resisting newton takes off it, mm/s.
@@ -50,7 +50,14 @@ impl DriveMotor {
     /// The worm gear locks itself: a load against the motion resists it, one along the
     /// motion does not help, and none turns a resting wheel. A disabled bridge stops
     /// the wheel within a few milliseconds.
-    pub fn turn(&self, speed: f64, duty: f64, enabled: bool, expected_n: f64, dt_s: f64) -> Turn {
+    pub(crate) fn turn(
+        &self,
+        speed: f64,
+        duty: f64,
+        enabled: bool,
+        expected_n: f64,
+        dt_s: f64,
+    ) -> Turn {
         if !enabled {
             let stopped = speed * (-dt_s / STOPS_IN_S).exp();
             let free_mm_s = if stopped.abs() < 1e-3 { 0.0 } else { stopped };
@@ -90,7 +97,7 @@ impl DriveMotor {
     /// Output of the bridge, part of the supply, at tread speed `speed`: the duty, or what is
     /// left of it where the bridge regulates its current. Of the duty the motor works with
     /// `worked`; the rest is lost behind the bridge.
-    pub fn bridge_output(&self, duty: f64, worked: f64, speed: f64) -> f64 {
+    pub(crate) fn bridge_output(&self, duty: f64, worked: f64, speed: f64) -> f64 {
         let ideal = self.stall_n * (worked - speed / self.no_load_mm_s);
         let excess = ideal - ideal.clamp(-self.limit_n, self.limit_n);
         let left = duty - excess / self.stall_n;
@@ -128,7 +135,7 @@ impl DriveMotor {
 
 /// Pre-tightener: duty commands screw speed; the spring turns travel into force.
 #[derive(Clone, Debug)]
-pub struct Pretightener {
+pub(crate) struct Pretightener {
     /// Force rate at full duty, N/s, as seen at the wheel.
     slew: f64,
     /// Time constant of the screw's speed, s.
@@ -151,7 +158,7 @@ pub struct Pretightener {
 
 impl Pretightener {
     /// A pre-tightener at `seat_n`, for a step of `dt_s`.
-    pub fn new(
+    pub(crate) fn new(
         slew: f64,
         lag: f64,
         delay_s: f64,
@@ -175,7 +182,7 @@ impl Pretightener {
 
     /// The same with a motor whose speed falls by the part `droop` as it raises `limit_n`, and
     /// with friction that takes this part of full duty. At `limit_n` it still gives its slew.
-    pub fn with_losses(mut self, droop: f64, friction: f64, limit_n: f64) -> Self {
+    pub(crate) fn with_losses(mut self, droop: f64, friction: f64, limit_n: f64) -> Self {
         (self.droop_per_n, self.friction) = (droop / limit_n, friction);
         self.slew /= 1.0 - droop - friction;
         self
@@ -183,7 +190,7 @@ impl Pretightener {
 
     /// Advances by the step at `duty` (-1 to 1) against `force_n`; a disabled bridge leaves the
     /// screw self-locked, at once. It locks itself: what presses does not drive it down.
-    pub fn step(&mut self, duty: f64, enabled: bool, force_n: f64, dt_s: f64) {
+    pub(crate) fn step(&mut self, duty: f64, enabled: bool, force_n: f64, dt_s: f64) {
         self.pipeline.push_back(if enabled { duty.clamp(-1.0, 1.0) } else { 0.0 });
         let delayed = self.pipeline.pop_front().unwrap_or(0.0);
         if !enabled {
@@ -222,14 +229,14 @@ impl Pretightener {
 
     /// Force of the screw's position at the undeformed wheel on level 0, N; the
     /// spring adds its rate times what the wheel has moved inwards.
-    pub fn seat_n(&self) -> f64 {
+    pub(crate) fn seat_n(&self) -> f64 {
         self.seat
     }
 }
 
 /// Play of the drive: the wheel between the flanks of its gear.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Play {
+pub(crate) struct Play {
     /// Travel of the tread from flank to flank, mm.
     width_mm: f64,
     /// How far the tread has run ahead of the flank that drives it forwards, mm.
@@ -240,18 +247,18 @@ pub struct Play {
 
 impl Play {
     /// Play of this width, mm, the wheel on the flank that drives it forwards.
-    pub const fn new(width_mm: f64) -> Self {
+    pub(crate) const fn new(width_mm: f64) -> Self {
         Self { width_mm, ahead_mm: 0.0, free: None }
     }
 
     /// Speed of the motor while the wheel is between the flanks, mm/s.
-    pub const fn motor_mm_s(&self) -> Option<f64> {
+    pub(crate) const fn motor_mm_s(&self) -> Option<f64> {
         self.free
     }
 
     /// The flank in contact had to push with this force, N, positive forwards, at this speed of
     /// the motor: it cannot pull, and lets go.
-    pub fn pushed(&mut self, force_n: f64, motor_mm_s: f64) {
+    pub(crate) fn pushed(&mut self, force_n: f64, motor_mm_s: f64) {
         let leaves =
             force_n < 0.0 && self.ahead_mm < self.width_mm || force_n > 0.0 && self.ahead_mm > 0.0;
         self.free = leaves.then_some(motor_mm_s);
@@ -259,7 +266,7 @@ impl Play {
 
     /// Free of the flanks the tread has travelled this much farther than the motor, mm, which
     /// ended with this speed. Returns whether it is still free.
-    pub fn travelled(&mut self, farther_mm: f64, motor_mm_s: f64) -> bool {
+    pub(crate) fn travelled(&mut self, farther_mm: f64, motor_mm_s: f64) -> bool {
         let ahead = self.ahead_mm + farther_mm;
         self.ahead_mm = ahead.clamp(0.0, self.width_mm);
         self.free = (ahead == self.ahead_mm).then_some(motor_mm_s);
@@ -368,28 +375,6 @@ mod tests {
             assert!((force - shown).abs() < 1e-9, "{force} {shown}");
             assert!(force.abs() <= 80.0 + 1e-9);
         }
-    }
-
-    #[test]
-    fn the_screw_keeps_within_its_ends_and_when_switched_off() {
-        let mut screw = Pretightener::new(25.0, 0.06, 0.0, 1e-3, 10.0, (-5.0, 12.0));
-        for _ in 0..1000 {
-            screw.step(1.0, true, 0.0, 1e-3);
-        }
-        assert_eq!(screw.seat_n(), 12.0);
-        for _ in 0..100 {
-            screw.step(-1.0, true, 0.0, 1e-3);
-        }
-        let held = screw.seat_n();
-        assert!(held < 12.0);
-        for _ in 0..100 {
-            screw.step(-1.0, false, 0.0, 1e-3);
-        }
-        assert_eq!(screw.seat_n(), held);
-        for _ in 0..2000 {
-            screw.step(-1.0, true, 0.0, 1e-3);
-        }
-        assert_eq!(screw.seat_n(), -5.0);
     }
 
     #[test]

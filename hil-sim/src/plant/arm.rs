@@ -45,14 +45,14 @@ impl ModeParameters {
     /// A mode at this frequency, Hz. The paper publishes 276 Hz for the constrained and 163 Hz
     /// for the free rig and nothing else: damping 0.02, modal mass 0.2 kg and shape 1 are chosen.
     /// The arm alone has 0.073 kg; wheel and motor move with its end.
-    pub const fn at(frequency_hz: f64) -> Self {
+    pub(crate) const fn at(frequency_hz: f64) -> Self {
         Self { frequency_hz, damping: 0.02, mass_kg: 0.2, shape: 1.0 }
     }
 }
 
 /// A sinusoidal force over a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Ripple {
+pub(crate) struct Ripple {
     pub amplitude_n: f64,
     /// Circular frequency, rad/s; signed.
     pub omega: f64,
@@ -65,7 +65,7 @@ pub struct Ripple {
 /// One mode of the arm: a damped oscillator, integrated exactly for a sinusoidal force and one
 /// that runs linearly.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Mode {
+pub(crate) struct Mode {
     /// Circular frequency, rad/s.
     omega: f64,
     /// Damping ratio.
@@ -88,7 +88,7 @@ pub struct Mode {
 
 impl Mode {
     /// A mode at rest.
-    pub fn new(parameters: ModeParameters) -> Self {
+    pub(crate) fn new(parameters: ModeParameters) -> Self {
         let ModeParameters { frequency_hz, damping: zeta, mass_kg, shape } = parameters;
         let omega = std::f64::consts::TAU * frequency_hz;
         Self { omega, zeta, stiffness: mass_kg * omega * omega * 1e-3, shape, ..Self::default() }
@@ -98,7 +98,7 @@ impl Mode {
     /// what is not the steady response to them dies away freely. That to the second one is
     /// `F/k - 2 zeta F'/(omega k)`. With x = Omega/omega the response to sin is
     /// ((1 - x^2) sin - 2 zeta x cos) / ((1 - x^2)^2 + (2 zeta x)^2) of the static one.
-    pub fn step(&mut self, force: &Ripple, load_n: (f64, f64), dt_s: f64) {
+    pub(crate) fn step(&mut self, force: &Ripple, load_n: (f64, f64), dt_s: f64) {
         let still = self.deflection == 0.0 && self.rate == 0.0 && load_n == (0.0, 0.0);
         if force.amplitude_n == 0.0 && still {
             return;
@@ -130,12 +130,12 @@ impl Mode {
     }
 
     /// Deflection beyond that by which it holds the slow force, mm.
-    pub fn deflection_mm(&self) -> f64 {
+    pub(crate) fn deflection_mm(&self) -> f64 {
         self.deflection - self.held
     }
 
     /// Elastic force of that deflection, N.
-    pub fn force_n(&self) -> f64 {
+    pub(crate) fn force_n(&self) -> f64 {
         self.deflection_mm() * self.stiffness
     }
 
@@ -160,7 +160,7 @@ const TURNS_IN_MM: f64 = 0.05;
 /// Coulomb friction in the arm's pivot that turns round over a short travel (Dahl's model,
 /// linear up to its bound).
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Pivot {
+pub(crate) struct Pivot {
     /// Friction, N at the wheel.
     friction_n: f64,
     /// Travel since friction turned round, mm, bounded either way.
@@ -169,17 +169,17 @@ pub struct Pivot {
 
 impl Pivot {
     /// A pivot with this friction, N at the wheel, relaxed.
-    pub const fn new(friction_n: f64) -> Self {
+    pub(crate) const fn new(friction_n: f64) -> Self {
         Self { friction_n, bent_mm: 0.0 }
     }
 
     /// The wheel has moved by this towards the pillar, mm.
-    pub fn follow(&mut self, rise_mm: f64) {
+    pub(crate) fn follow(&mut self, rise_mm: f64) {
         self.bent_mm = (self.bent_mm + rise_mm).clamp(-TURNS_IN_MM, TURNS_IN_MM);
     }
 
     /// Force that presses the wheel to the wall, N: against its motion.
-    pub fn force_n(&self) -> f64 {
+    pub(crate) fn force_n(&self) -> f64 {
         self.friction_n * self.bent_mm / TURNS_IN_MM
     }
 }

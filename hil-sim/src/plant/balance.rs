@@ -105,7 +105,7 @@ impl Balance {
     }
 
     /// What presses the wheel at this lift, N, and how that grows, N/mm.
-    pub fn pressed(&self, lift_mm: f64) -> (f64, f64) {
+    pub(crate) fn pressed(&self, lift_mm: f64) -> (f64, f64) {
         let spring = (self.preload_n + self.spring_n_per_mm * lift_mm).max(0.0);
         let pressed = (spring + self.arm_n).max(0.0);
         let taut = spring > 0.0 && pressed > 0.0;
@@ -121,7 +121,7 @@ impl Balance {
 
     /// Brings a ring to rest on this wall under a radial load, N, from this height above it,
     /// mm, its rubber relaxed.
-    pub fn rest(
+    pub(crate) fn rest(
         ring: &mut Ring,
         wall: LocalWall,
         height_mm: f64,
@@ -136,7 +136,11 @@ impl Balance {
     /// The same where the height in `motion` is predicted so well that one step of Newton's
     /// method does: if less than a small part of the preload is left there, the contact is moved
     /// by its derivatives and not computed again. Its force errs by a part of 1e-7.
-    pub fn solve_near(&self, ring: &mut Ring, motion: Motion) -> Result<Solved, BalanceError> {
+    pub(crate) fn solve_near(
+        &self,
+        ring: &mut Ring,
+        motion: Motion,
+    ) -> Result<Solved, BalanceError> {
         let contact = ring.trial(&motion);
         let lift = motion.height_mm - ring.parameters().radius_mm;
         let forces = (contact.cosine_n, contact.sine_n);

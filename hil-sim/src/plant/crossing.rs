@@ -69,7 +69,7 @@ pub fn cross(case: &CrossingCase) -> Result<CrossingResult, BalanceError> {
 
 /// The same with the speed, mm/s, and the preload, N, of each place of the axle, mm from the face
 /// outwards; of the case's speed the sign counts.
-pub fn cross_along(
+pub(crate) fn cross_along(
     case: &CrossingCase,
     course: &dyn Fn(f64) -> (f64, f64),
 ) -> Result<CrossingResult, BalanceError> {
@@ -145,14 +145,14 @@ pub fn cross_along(
 }
 
 /// Largest speed, mm/s, and preload, N, of a course.
-pub const MAX_SPEED_MM_S: f64 = 2000.0;
+pub(crate) const MAX_SPEED_MM_S: f64 = 2000.0;
 /// See [`MAX_SPEED_MM_S`].
-pub const MAX_PRELOAD_N: f64 = 1000.0;
+pub(crate) const MAX_PRELOAD_N: f64 = 1000.0;
 
 /// One line of a course.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Knot {
+pub(crate) struct Knot {
     /// Place of the axle from the face outwards, mm.
     pub x_mm: f64,
     /// Axial speed there, mm/s.
@@ -164,14 +164,14 @@ pub struct Knot {
 /// Knots in the order in which the wheel comes to them: straight lines between them, the first one
 /// before it, the last one behind it.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Course(Vec<Knot>);
+pub(crate) struct Course(Vec<Knot>);
 
 impl Course {
     /// Reads a CSV file with the columns of [`Knot`].
     ///
     /// # Errors
     /// One sentence that names the file, the line and what was expected.
-    pub fn read(path: &Path, retracts: bool) -> Result<Self, String> {
+    pub(crate) fn read(path: &Path, retracts: bool) -> Result<Self, String> {
         let at = |what: &dyn std::fmt::Display| format!("{}: {what}", path.display());
         let mut table = csv::Reader::from_path(path).map_err(|error| at(&error))?;
         let knots = table.deserialize().collect::<Result<_, _>>().map_err(|error| at(&error))?;
@@ -182,7 +182,7 @@ impl Course {
     ///
     /// # Errors
     /// One sentence that names the knot and what was expected.
-    pub fn try_new(knots: Vec<Knot>, retracts: bool) -> Result<Self, String> {
+    pub(crate) fn try_new(knots: Vec<Knot>, retracts: bool) -> Result<Self, String> {
         if knots.is_empty() {
             return Err("expected at least one row of x_mm, speed_mm_s, preload_n".to_owned());
         }
@@ -215,12 +215,12 @@ impl Course {
     }
 
     /// Speed, mm/s, and preload, N, with which it begins.
-    pub fn start(&self) -> (f64, f64) {
+    pub(crate) fn start(&self) -> (f64, f64) {
         (self.0[0].speed_mm_s, self.0[0].preload_n)
     }
 
     /// Speed, mm/s, and preload, N, at a place, mm.
-    pub fn at(&self, x_mm: f64) -> (f64, f64) {
+    pub(crate) fn at(&self, x_mm: f64) -> (f64, f64) {
         let value = |knot: &Knot| (knot.speed_mm_s, knot.preload_n);
         let is_between = |pair: &&[Knot]| {
             let (a, b) = (pair[0].x_mm, pair[1].x_mm);

@@ -16,11 +16,11 @@ use super::wind_up::Shear;
 /// Elements of the ring in a deployment. With the usual stride the gap is within 0.25 %,
 /// the largest force within 0.3 % of a ring twenty times as fine. Two thirds of them keep
 /// the gap as well, but not the friction at which a sliding wheel still climbs.
-pub const ELEMENTS: usize = 1440;
+pub(crate) const ELEMENTS: usize = 1440;
 
 /// Room between each end of the travel and its stop, mm: the 85 mm of the sliding
 /// connector around 80 mm of travel.
-pub const STOP_ROOM_MM: f64 = 2.5;
+pub(crate) const STOP_ROOM_MM: f64 = 2.5;
 
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlantParameters {
@@ -107,7 +107,7 @@ impl PlantParameters {
     }
 
     /// The pre-tightener with this dead time, s.
-    pub fn pretightener(
+    pub(crate) fn pretightener(
         &self,
         delay_s: f64,
         dt_s: f64,
@@ -124,7 +124,7 @@ impl PlantParameters {
     /// The plant of a seed: `rig` with this spread, and with these steps, each its position
     /// and how much higher than the table says it is, mm. Seed 0 is the nominal rig without
     /// mismatch; its sensors still quantise and have their noise.
-    pub fn draw(
+    pub(crate) fn draw(
         rig: &Rig,
         steps: &[(f64, f64)],
         spread: &Spread,

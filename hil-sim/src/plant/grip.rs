@@ -46,7 +46,7 @@ pub struct Grip {
 
 /// How a step ends.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Ended {
+pub(crate) struct Ended {
     /// Tread's speed, mm/s.
     pub tread: f64,
     /// Carriage's speed, mm/s.
@@ -58,7 +58,7 @@ pub struct Ended {
 impl Grip {
     /// Friction utilisation, traction over normal force, in a contact with these cosine and
     /// sine sums, N, and its derivatives by both, 1/N.
-    pub fn utilisation(&self, cosine: f64, sine: f64) -> (f64, (f64, f64)) {
+    pub(crate) fn utilisation(&self, cosine: f64, sine: f64) -> (f64, (f64, f64)) {
         if cosine <= 0.0 {
             return (0.0, (0.0, 0.0));
         }
@@ -96,7 +96,7 @@ impl Grip {
     }
 
     /// Speeds at the end with this utilisation.
-    pub fn ended(&self, utilisation: f64, cosine: f64, sine: f64) -> Ended {
+    pub(crate) fn ended(&self, utilisation: f64, cosine: f64, sine: f64) -> Ended {
         let traction = utilisation * cosine;
         let sense = sense_of(self.tread);
         let tread_load_n = sense * self.load(sense * traction);
@@ -122,14 +122,14 @@ impl Grip {
 
     /// Speed of the tread over the wall without what winds it up, mm/s, at this tread's and
     /// carriage's speed and this traction.
-    pub fn creeps(&self, tread: f64, speed: f64, traction_n: f64) -> f64 {
+    pub(crate) fn creeps(&self, tread: f64, speed: f64, traction_n: f64) -> f64 {
         let winding = &self.winding;
         let winds = (winding.end(traction_n).mm - winding.from_mm) / winding.dt_s;
         tread - speed / self.advance - winds
     }
 
     /// The part of it that is beyond elastic creep, mm/s.
-    pub fn slides(&self, ended: &Ended, utilisation: f64, cosine: f64) -> f64 {
+    pub(crate) fn slides(&self, ended: &Ended, utilisation: f64, cosine: f64) -> f64 {
         let slip =
             self.creeps(ended.tread, ended.speed, self.traction_n(utilisation, cosine)).abs();
         // Where all friction is used.
@@ -140,7 +140,7 @@ impl Grip {
     }
 
     /// Traction at the tread, N, at this utilisation.
-    pub fn traction_n(&self, utilisation: f64, cosine: f64) -> f64 {
+    pub(crate) fn traction_n(&self, utilisation: f64, cosine: f64) -> f64 {
         utilisation * self.normal * cosine
     }
 }

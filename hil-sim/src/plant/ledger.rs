@@ -4,11 +4,11 @@ use super::wall::Step;
 
 /// Travel of the axle over which the speed before lift-off counts, mm. The controller's
 /// `model::history` has the same for the tread, which is what it can measure.
-pub const REMEMBERED_MM: f64 = 0.5;
+pub(crate) const REMEMBERED_MM: f64 = 0.5;
 
 /// What is looked at every ring step.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Moment {
+pub(crate) struct Moment {
     pub time_s: f64,
     /// Axial position of the centre, mm.
     pub position_mm: f64,
@@ -43,7 +43,7 @@ pub struct Crossing {
     /// Clearance of the step root from the undeformed wheel at that instant, mm.
     pub gap_mm: f64,
     /// Speed of the crossing: travel over time before that instant, with a weight that falls by e
-    /// in [`REMEMBERED_MM`], mm/s.
+    /// in `REMEMBERED_MM`, mm/s.
     pub speed_mm_s: f64,
     /// Preload at that instant, N.
     pub preload_n: f64,
@@ -78,7 +78,7 @@ struct Open {
 
 impl Ledger {
     /// A ledger over these steps for a wheel of this radius, mm.
-    pub fn new(steps: Vec<Step>, radius_mm: f64) -> Self {
+    pub(crate) fn new(steps: Vec<Step>, radius_mm: f64) -> Self {
         Self { steps, radius_mm, done: Vec::new(), open: None }
     }
 
@@ -88,7 +88,7 @@ impl Ledger {
         &self.done
     }
 
-    pub fn record(&mut self, now: &Moment) {
+    pub(crate) fn record(&mut self, now: &Moment) {
         let Some(mut open) = self.open.take().or_else(|| self.begin(now)) else { return };
         // Off the corner, over the edge or back where it came from.
         let over = now.position_mm >= open.crossing.step_mm;

@@ -7,16 +7,16 @@ use super::ring::RingParameters;
 
 /// Deepest that a corner may be pressed into the tread, parts of the wheel's radius.
 /// The radial law ends where the depth is no longer small against the radius.
-pub const DEEPEST: f64 = 0.4;
+pub(crate) const DEEPEST: f64 = 0.4;
 
 /// Highest that a corner, pressed in as deep as it can be, may stand, parts of the
 /// radius: from there the face leans on the wheel at the height of its axle.
-pub const HIGHEST: f64 = 0.85;
+pub(crate) const HIGHEST: f64 = 0.85;
 
 /// Deepest that a corner may be pressed into a tread of coupled elements, parts of its
 /// thickness: small strains end there. The depth is that of independent elements, a seventh
 /// more than coupled ones give way.
-pub const CRUSHED: f64 = 0.65;
+pub(crate) const CRUSHED: f64 = 0.65;
 
 /// A combination of parameters that cannot be computed, because it cannot be.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -29,20 +29,20 @@ pub struct Refusal {
 }
 
 /// Name of a refusal: preload on the corner.
-pub const SINKS: &str = "preload sinks the wheel";
+pub(crate) const SINKS: &str = "preload sinks the wheel";
 /// Preload on a corner of a thin tread.
-pub const CRUSHES: &str = "preload crushes the tread";
+pub(crate) const CRUSHES: &str = "preload crushes the tread";
 /// Momentum and friction together.
-pub const DIGS: &str = "braked wheel digs itself in";
+pub(crate) const DIGS: &str = "braked wheel digs itself in";
 /// Step and depth together.
-pub const TOWERS: &str = "corner as high as the hub";
+pub(crate) const TOWERS: &str = "corner as high as the hub";
 
 impl PlantParameters {
     /// Whether the rig can be run under preloads up to `preload_n`.
     ///
     /// # Errors
     /// The [`Refusal`] that names the parameters and their limit.
-    pub fn check(&self, preload_n: f64) -> Result<(), Refusal> {
+    pub(crate) fn check(&self, preload_n: f64) -> Result<(), Refusal> {
         let radius_mm = self.ring.radius_mm;
         let most_mm = DEEPEST * radius_mm;
         let wedge = self.arm.thrust_ratio(self.wall_radius_mm - radius_mm);
@@ -105,14 +105,14 @@ impl PlantParameters {
 
 /// Tangent of the direction from the wheel's centre to a corner this far above the lowest
 /// point of its rim, mm: axial over radial force of a frictionless contact there.
-pub fn leans(radius_mm: f64, above_mm: f64) -> f64 {
+pub(crate) fn leans(radius_mm: f64, above_mm: f64) -> f64 {
     let over = radius_mm - above_mm;
     (radius_mm * radius_mm - over * over).max(0.0).sqrt() / over.max(1e-9)
 }
 
 /// Energy that a corner of a step may bring into the tread, mJ: a fourth of what takes it to
 /// the depth allowed, `k L d^3/3`, for the rest of the tread is not as stiff.
-pub fn takes(ring: &RingParameters, step_mm: f64) -> f64 {
+pub(crate) fn takes(ring: &RingParameters, step_mm: f64) -> f64 {
     let depth = (DEEPEST * ring.radius_mm).min(HIGHEST * ring.radius_mm - step_mm);
     ring.k_inf * ring.width_mm * depth.powi(3) / 12.0
 }

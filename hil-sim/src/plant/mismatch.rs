@@ -88,7 +88,7 @@ impl Default for Mismatch {
 impl Mismatch {
     /// The wide draw of a seed: each value evenly within its range, a factor evenly in its
     /// logarithm. A value that is not neutral stays. `beyond`: names with another range.
-    pub fn draw(&self, seed: u64, beyond: &[(&str, (f64, f64))]) -> Self {
+    pub(crate) fn draw(&self, seed: u64, beyond: &[(&str, (f64, f64))]) -> Self {
         // Another stream than that of the spread and those of the sensors.
         let mut random = ChaCha8Rng::seed_from_u64(seed ^ 0x0031_5a7c_0000_0000);
         let mut drawn = self.clone();
@@ -112,7 +112,7 @@ impl Mismatch {
 
 impl RingParameters {
     /// This wheel and rubber with what the controller is not told of.
-    pub fn with_mismatch(mut self, mismatch: &Mismatch) -> Self {
+    pub(crate) fn with_mismatch(mut self, mismatch: &Mismatch) -> Self {
         let Mismatch { tread_stiffness, tread_stiffening, tread_tau, .. } = *mismatch;
         // Rubber that softens at once does not exist.
         let stiffening = (self.k_0 / self.k_inf * tread_stiffening).max(1.0);

@@ -63,7 +63,6 @@ pub struct Point {
 }
 
 /// The crossings that the error is measured on: speed, negative on retraction, preload and load.
-#[must_use]
 pub fn cases() -> Vec<(f64, f64, Axial)> {
     let mut all = Vec::new();
     for (speed, preload) in [(5.0, 100.0), (8.0, 40.0), (25.0, 60.0)] {

@@ -66,7 +66,7 @@ pub struct Drives {
 
 impl Drives {
     /// Duty that drive and pre-tightener work with.
-    pub fn worked(&self) -> [f64; 2] {
+    pub(crate) fn worked(&self) -> [f64; 2] {
         [self.drive * (1.0 - self.lost[0]), self.preload * (1.0 - self.lost[1])]
     }
 }
@@ -405,5 +405,32 @@ impl VirtualRig {
         }
         self.truth.vibration_mm = deflection;
         self.vibration_n = sum / self.modes.len().max(1) as f64;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scenario::Scenario;
+
+    #[test]
+    fn the_screw_ends_a_quarter_beyond_the_limit_and_slack_on_every_wall() {
+        let plant = Scenario::default().plant();
+        // The spring on the innermost wall is three steps shorter.
+        for (position_mm, raised_mm) in [(0.0, 0.0), (80.0, 12.0)] {
+            let mut rig = VirtualRig::new(plant.clone(), position_mm, 33.3, 1e-3);
+            let mut wound = |preload: f64, preload_on: bool| {
+                let drives = Drives { preload, preload_on, ..Drives::default() };
+                (0..4000).for_each(|_| rig.step(&drives, 1e-3).expect("a step"));
+                (rig.truth().preload_n, rig.truth().depth_mm)
+            };
+            let (preload_n, depth_mm) = wound(1.0, true);
+            assert!((preload_n + 1.2 * depth_mm - (62.5 + 1.2 * raised_mm)).abs() < 1e-9);
+            // Off, it stays where it is, whatever is asked.
+            assert!((wound(-1.0, false).0 - preload_n).abs() < 0.01);
+            // The slack end has one more millimetre than each step is high.
+            assert_eq!(wound(-1.0, true).0, 0.0);
+            assert!((rig.preload.seat_n() + 1.2 * 15.0).abs() < 1e-9);
+        }
     }
 }

@@ -117,13 +117,13 @@ impl Ring {
 
     /// The same ring, visiting every element that faces the wall, in reach or not: for
     /// proof that the others change nothing.
-    pub fn visiting_all(mut self) -> Self {
+    pub(crate) fn visiting_all(mut self) -> Self {
         self.visit_all = true;
         self
     }
 
     /// What the elements took up, mJ: stored in those in contact, the rest lost in them.
-    pub fn taken_mj(&self) -> f64 {
+    pub(crate) fn taken_mj(&self) -> f64 {
         self.taken_mj
     }
 
@@ -194,7 +194,7 @@ impl Ring {
 
     /// Mean depth of the patch, mm, each part weighted with the pressure that it carries, and
     /// by 5/4, so that on a level wall it is the deepest; zero off the wall.
-    pub fn carrying_mm(&self) -> f64 {
+    pub(crate) fn carrying_mm(&self) -> f64 {
         if let Some(coupled) = &self.coupled {
             return coupled.carrying_mm();
         }
@@ -296,7 +296,12 @@ impl Ring {
     /// Puts the ring into the state that `profile` gives for an angle from straight
     /// down (rad) of at most `within_rad`: depth and internal displacement, both mm, at
     /// time `time_s`. Elsewhere it is unloaded and fresh.
-    pub fn seed(&mut self, time_s: f64, within_rad: f64, profile: impl Fn(f64) -> (f64, [f64; 2])) {
+    pub(crate) fn seed(
+        &mut self,
+        time_s: f64,
+        within_rad: f64,
+        profile: impl Fn(f64) -> (f64, [f64; 2]),
+    ) {
         self.q.fill(Lanes::ZERO);
         self.slow.fill(Lanes::ZERO);
         self.depth.fill(Lanes::ZERO);

@@ -24,7 +24,7 @@ pub struct Rolling {
 }
 
 /// Steady contact at this height and tread speed (mm/s, signed).
-pub fn at_height(ring: &RingParameters, height_mm: f64, speed_mm_s: f64) -> Rolling {
+pub(crate) fn at_height(ring: &RingParameters, height_mm: f64, speed_mm_s: f64) -> Rolling {
     sum(ring, height_mm, speed_mm_s, NODES)
 }
 
@@ -117,7 +117,7 @@ impl Rolling {
 /// Steady rolling near a depth and a speed: what scales out (force with depth^1.5, arc
 /// with depth^0.5) is exact, the rest, which hardly changes, is a tangent.
 #[derive(Clone, Copy, Debug)]
-pub struct Tangent {
+pub(crate) struct Tangent {
     depth: f64,
     speed: f64,
     /// Normal, cosine and sine sums over depth^1.5, area over depth^0.5.
@@ -129,7 +129,7 @@ pub struct Tangent {
 
 impl Tangent {
     /// Taken at this height above the wall, mm, and tread speed, mm/s; none off the wall.
-    pub fn new(ring: &RingParameters, height_mm: f64, speed_mm_s: f64) -> Option<Self> {
+    pub(crate) fn new(ring: &RingParameters, height_mm: f64, speed_mm_s: f64) -> Option<Self> {
         let depth = ring.radius_mm - height_mm;
         if depth <= 0.0 {
             return None;
@@ -151,13 +151,13 @@ impl Tangent {
     }
 
     /// Whether it holds at this height and speed.
-    pub fn holds(&self, ring: &RingParameters, height_mm: f64, speed_mm_s: f64) -> bool {
+    pub(crate) fn holds(&self, ring: &RingParameters, height_mm: f64, speed_mm_s: f64) -> bool {
         (ring.radius_mm - height_mm - self.depth).abs() <= NEAR * self.depth
             && (speed_mm_s - self.speed).abs() <= NEAR * self.speed.abs()
     }
 
     /// Contact at this height and tread speed.
-    pub fn at(&self, ring: &RingParameters, height_mm: f64, speed_mm_s: f64) -> Rolling {
+    pub(crate) fn at(&self, ring: &RingParameters, height_mm: f64, speed_mm_s: f64) -> Rolling {
         let depth = ring.radius_mm - height_mm;
         if depth <= 0.0 {
             return Rolling { height_mm, slope: -ring.k_inf, ..Rolling::default() };
@@ -181,7 +181,7 @@ impl Tangent {
 /// Steady rolling solved again and again under slowly changing load and speed: mostly by
 /// the tangent at one of the last solutions.
 #[derive(Clone, Debug, Default)]
-pub struct Steady {
+pub(crate) struct Steady {
     tangent: Option<Tangent>,
     /// Contacts computed node by node.
     computed: u64,
@@ -191,7 +191,7 @@ pub struct Steady {
 
 impl Steady {
     /// As [`solve`], by tangents within the error named there.
-    pub fn solve(
+    pub(crate) fn solve(
         &mut self,
         ring: &RingParameters,
         speed_mm_s: f64,
@@ -232,7 +232,7 @@ impl Steady {
 
 /// Depth and internal displacements (mm) across the patch, by angle from straight
 /// down, for seeding the ring.
-pub fn profile(
+pub(crate) fn profile(
     ring: &RingParameters,
     height_mm: f64,
     speed_mm_s: f64,
@@ -246,7 +246,7 @@ pub fn profile(
 }
 
 /// Mean depth of the patch as [`super::ring::Ring::carrying_mm`] has it, mm.
-pub fn carrying_mm(ring: &RingParameters, height_mm: f64, speed_mm_s: f64) -> f64 {
+pub(crate) fn carrying_mm(ring: &RingParameters, height_mm: f64, speed_mm_s: f64) -> f64 {
     let (mut carried, mut sum) = (0.0, 0.0);
     walk(ring, height_mm, speed_mm_s, NODES, |_, _, depth, q| {
         let memory = 0.5 * (q[0] + q[1]);

@@ -1,5 +1,5 @@
 //! The sensors and the readback of the bridges: from what is true to the codes that the
-//! converters give. A sensor is an entry of [`SENSORS`], with its noise in [`Noise`].
+//! converters give. A sensor is an entry of `SENSORS`, with its noise in [`Noise`].
 
 use std::collections::VecDeque;
 use std::f64::consts::TAU;
@@ -17,7 +17,7 @@ use super::truth::Truth;
 
 /// Form of a sensor's code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Coding {
+pub(crate) enum Coding {
     /// A counter that wraps.
     Counter,
     /// A converter, from 0 to 65535.
@@ -28,7 +28,7 @@ pub enum Coding {
 
 impl Coding {
     /// The code nearest to this number.
-    pub fn code(self, number: f64) -> u16 {
+    pub(crate) fn code(self, number: f64) -> u16 {
         match self {
             Self::Counter => number.floor() as i64 as u16,
             Self::Converter => number.round().clamp(0.0, SPAN) as u16,
@@ -41,7 +41,7 @@ impl Coding {
 }
 
 /// A sensor of the plant, and how a fault distorts it.
-pub struct SensorModel {
+pub(crate) struct SensorModel {
     pub coding: Coding,
     /// The quantity that it measures.
     truth: fn(&Truth) -> f64,
@@ -56,7 +56,7 @@ pub struct SensorModel {
 }
 
 /// Largest code of a converter.
-pub const SPAN: f64 = 65_535.0;
+pub(crate) const SPAN: f64 = 65_535.0;
 /// Codes of a turn of the angle sensor.
 const TURN: f64 = 16_384.0;
 /// Part of the converter's range at which a bridge reads zero.
@@ -64,7 +64,7 @@ const ZERO: f64 = 0.05;
 /// Part of the converter's range at which it reads full scale.
 const FULL: f64 = 0.90;
 /// An offset of a quantity.
-pub const MORE: &str = "reads so much more than is true";
+pub(crate) const MORE: &str = "reads so much more than is true";
 
 /// Number of a converter at a bridge at this part of its full scale.
 fn bridge(part: f64) -> f64 {
@@ -77,7 +77,7 @@ fn bridge_scale(full_scale: f64) -> (f64, f64) {
 }
 
 /// Every sensor, by [`SensorId`].
-pub static SENSORS: [SensorModel; SensorId::COUNT] = [
+pub(crate) static SENSORS: [SensorModel; SensorId::COUNT] = [
     SensorModel {
         coding: Coding::Counter,
         truth: |t| t.rotation_rad,

@@ -11,7 +11,7 @@ pub struct Step {
 
 /// How the wall departs from level pieces with sharp edges.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Form {
+pub(crate) struct Form {
     /// Radius of the steps' edges, mm.
     pub edge_radius_mm: f64,
     /// Rise from position 0 to the length, mm.
@@ -25,7 +25,7 @@ pub struct Form {
 impl Form {
     /// Rise of the wall at an axial position, mm, and its slope: a straight line and a
     /// parabola, which go on beyond the ends.
-    pub fn rise(&self, x_mm: f64) -> (f64, f64) {
+    pub(crate) fn rise(&self, x_mm: f64) -> (f64, f64) {
         if (self.taper_mm, self.bend_mm) == (0.0, 0.0) {
             return (0.0, 0.0);
         }
@@ -72,7 +72,7 @@ pub struct LocalWall {
 
 /// Direction of the edge behind, from straight down towards the back.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Edge {
+pub(crate) struct Edge {
     sin: f64,
     cos: f64,
 }
@@ -88,7 +88,7 @@ impl Edge {
     /// sine and cosine of its angle. The wall ends there at once; without this a whole
     /// element would.
     #[inline]
-    pub fn covered(&self, sin: f64, cos: f64, pitch: f64) -> f64 {
+    pub(crate) fn covered(&self, sin: f64, cos: f64, pitch: f64) -> f64 {
         // Sine of the angle from the edge to the element.
         let within = self.sin * cos + self.cos * sin;
         (0.5 + within / pitch).clamp(0.0, 1.0)
@@ -103,7 +103,7 @@ impl Wall {
     }
 
     /// The same wall of this form.
-    pub fn with_form(mut self, form: Form) -> Self {
+    pub(crate) fn with_form(mut self, form: Form) -> Self {
         let plain = (form.edge_radius_mm, form.taper_mm, form.bend_mm) == (0.0, 0.0, 0.0);
         self.form = if plain { Form::default() } else { form };
         self
@@ -160,7 +160,7 @@ impl LocalWall {
     }
 
     /// The edge behind as seen from the centre, `y` mm above the wall under it.
-    pub fn edge(&self, y: f64) -> Edge {
+    pub(crate) fn edge(&self, y: f64) -> Edge {
         if self.behind_mm == f64::INFINITY {
             return Edge { sin: 1.0, cos: 0.0 };
         }
@@ -170,7 +170,7 @@ impl LocalWall {
 
     /// Distance from the centre, `y` mm above the wall under it, to the nearest point
     /// of the wall: straight down or the corner ahead.
-    pub fn nearest(&self, y: f64) -> f64 {
+    pub(crate) fn nearest(&self, y: f64) -> f64 {
         let round = self.edge_radius_mm;
         let over = y - self.rise_mm;
         if round == 0.0 {

@@ -24,7 +24,7 @@ pub struct Shear {
 
 /// Displacement of the rim against the hub along the wall, and its memory.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct WindUp {
+pub(crate) struct WindUp {
     /// Displacement, mm, positive as the tread runs ahead of the wheel outwards.
     pub mm: f64,
     memory_mm: [f64; 2],
@@ -46,7 +46,7 @@ pub struct Winding {
 
 impl Shear {
     /// The layer of this wheel, `compliance` times as compliant.
-    pub fn of(ring: &RingParameters, compliance: f64) -> Self {
+    pub(crate) fn of(ring: &RingParameters, compliance: f64) -> Self {
         let thickness = ring.thickness_mm();
         let layer = shear::Shear::of_layer(ring.radius_mm, ring.width_mm, thickness, ring.k_inf);
         Self {
@@ -74,7 +74,7 @@ impl RingParameters {
 
 impl WindUp {
     /// The step of `dt_s`, rolling at this speed, mm/s, on a contact of this length, mm.
-    pub fn over(&self, shear: &Shear, rolling: f64, contact_mm: f64, dt_s: f64) -> Winding {
+    pub(crate) fn over(&self, shear: &Shear, rolling: f64, contact_mm: f64, dt_s: f64) -> Winding {
         let renewed = 2.0 * rolling / contact_mm;
         let follows = [0, 1].map(|i| {
             let caught = dt_s / shear.relaxations_s[i];
@@ -96,14 +96,14 @@ impl WindUp {
     }
 
     /// Steady displacement under this traction, N, at this speed, mm/s.
-    pub fn steady(shear: &Shear, traction_n: f64, rolling: f64, contact_mm: f64) -> Self {
+    pub(crate) fn steady(shear: &Shear, traction_n: f64, rolling: f64, contact_mm: f64) -> Self {
         let renewed = 2.0 * rolling / contact_mm;
         let mm = traction_n / shear.rolling_n_per_mm(renewed);
         Self { mm, memory_mm: shear.relaxations_s.map(|tau_s| mm / (1.0 + renewed * tau_s)) }
     }
 
     /// Stored energy, mJ.
-    pub fn stored_mj(&self, shear: &Shear) -> f64 {
+    pub(crate) fn stored_mj(&self, shear: &Shear) -> f64 {
         let more = 0.5 * (shear.stiffening - 1.0);
         let branches: f64 = self.memory_mm.iter().map(|q| more * (self.mm - q).powi(2)).sum();
         0.5 * shear.n_per_mm * (self.mm * self.mm + branches)
@@ -112,7 +112,7 @@ impl WindUp {
 
 impl Winding {
     /// The displacement at the end of the step under this traction, N.
-    pub fn end(&self, traction_n: f64) -> WindUp {
+    pub(crate) fn end(&self, traction_n: f64) -> WindUp {
         let mm = (traction_n - self.free_n) / self.n_per_mm;
         WindUp { mm, memory_mm: self.follows.map(|(part, kept)| part * mm + kept) }
     }

@@ -23,7 +23,7 @@ const PAUSE: Duration = Duration::from_micros(200);
 const MARK: usize = 16;
 
 /// A board at a probe.
-pub struct RealPort {
+pub(crate) struct RealPort {
     session: Session,
     channels: Channels<rtt::Rtt>,
     /// Address of the control block; unknown, it is searched for in RAM.
@@ -35,7 +35,7 @@ impl RealPort {
     /// Attaches to the board at the only probe, or at the one that `PROBE_RS_PROBE`
     /// names, without disturbing what runs there. The control block of its channels is
     /// at `block`, if that is known.
-    pub fn attach(block: Option<u32>) -> Result<Self, PortError> {
+    pub(crate) fn attach(block: Option<u32>) -> Result<Self, PortError> {
         let absent = |error: &dyn std::fmt::Display| PortError::Absent(error.to_string());
         let lister = Lister::new();
         let probe = match std::env::var(SELECTOR) {
@@ -57,7 +57,7 @@ impl RealPort {
     }
 
     /// Puts an image into the board's flash and reads it back. Parameters stored there stay.
-    pub fn flash(&mut self, elf: &Path) -> Result<(), PortError> {
+    pub(crate) fn flash(&mut self, elf: &Path) -> Result<(), PortError> {
         self.channels.forget();
         let mut options = DownloadOptions::default();
         options.verify = true;

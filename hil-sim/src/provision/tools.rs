@@ -31,7 +31,7 @@ pub struct Tools {
 
 impl Tools {
     /// The tools, fetched first if they are missing.
-    pub fn ready() -> Result<Self, ProvisionError> {
+    pub(crate) fn ready() -> Result<Self, ProvisionError> {
         let place = firmware::target_directory().join(FOLDER);
         let failed = |why: &str| ProvisionError::Tools(place.clone(), why.into());
         let headers = headers()?.ok_or_else(|| failed("the C compiler names no headers"))?;
@@ -45,7 +45,7 @@ impl Tools {
     }
 
     /// Makes the build of `command` use the tools.
-    pub fn apply(&self, command: &mut Command) {
+    pub(crate) fn apply(&self, command: &mut Command) {
         let old = env::var_os("PATH").unwrap_or_default();
         let paths = std::iter::once(self.programs.clone())
             .chain(env::split_paths(&old).filter(|path| *path != self.programs));

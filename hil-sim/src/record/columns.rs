@@ -26,7 +26,7 @@ pub(super) fn angle_frame(code: u16, error: u8) -> AngleFrame {
 }
 
 /// A quantity of the controller.
-pub struct Column {
+pub(crate) struct Column {
     pub name: &'static str,
     /// The stage of the tick that gives it.
     pub stage: &'static str,

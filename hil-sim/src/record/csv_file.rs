@@ -13,7 +13,7 @@ use crate::files::{FileError, write_text};
 
 /// What a table has no place for.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Metadata {
+pub(crate) struct Metadata {
     /// Firmware and hashes of its parameters.
     pub header: Option<Header>,
     /// The rig's parameters as TOML.
@@ -52,7 +52,7 @@ pub(super) fn metadata_of(csv: &Path) -> Result<Metadata, String> {
 
 /// Writes the metadata of the table at `csv`, with the plant's columns where it has the truth,
 /// and returns their path.
-pub fn write_metadata(
+pub(crate) fn write_metadata(
     csv: &Path,
     metadata: &Metadata,
     with_truth: bool,

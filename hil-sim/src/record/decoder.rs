@@ -108,7 +108,7 @@ pub struct Counts {
 
 impl Counts {
     /// Whether there are ticks, and none is known to be missing.
-    pub const fn is_complete(&self) -> bool {
+    pub(crate) const fn is_complete(&self) -> bool {
         self.ticks > 0 && self.lost_frames == 0 && self.lost_ticks == 0
     }
 }
@@ -156,7 +156,7 @@ impl Decoder {
     }
 
     /// The log ends here; a frame that has begun is garbage.
-    pub fn finish(&mut self, take: &mut impl FnMut(Item)) {
+    pub(crate) fn finish(&mut self, take: &mut impl FnMut(Item)) {
         let held = std::mem::take(&mut self.partial);
         self.find(&held, true, take);
         self.report_garbage(take);

@@ -74,7 +74,7 @@ impl JoinedLog {
     }
 
     /// Who has made the log, as soon as it says so.
-    pub const fn identity(&self) -> Option<&Identity> {
+    pub(crate) const fn identity(&self) -> Option<&Identity> {
         self.identity.as_ref()
     }
 
@@ -84,7 +84,7 @@ impl JoinedLog {
     }
 
     /// Number of the first tick that is not in the log although the plant is there.
-    pub fn lacks(&self) -> Option<Tick> {
+    pub(crate) fn lacks(&self) -> Option<Tick> {
         let there = (0..).zip(&self.ticks).take_while(|(at, tick)| *at == tick.0).count();
         (there < self.truths.len()).then(|| self.first + there as Tick)
     }

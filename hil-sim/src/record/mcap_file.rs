@@ -87,7 +87,7 @@ impl Topic {
     /// The topics of a log that grows.
     pub(crate) const LIVE: [Self; 3] = [Self::Tick, Self::Log, Self::Ledger];
 
-    pub const fn name(self) -> &'static str {
+    pub(crate) const fn name(self) -> &'static str {
         ["/tick", "/log", "/ledger", "/crossing", "/summary", FRAMES][self as usize]
     }
 

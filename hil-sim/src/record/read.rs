@@ -28,7 +28,7 @@ pub enum ReadError {
 
 impl ReadError {
     /// What is wrong, without the path.
-    pub fn reason(&self) -> String {
+    pub(crate) fn reason(&self) -> String {
         match self {
             Self::File(_, why) => why.to_string(),
             Self::Table(_) => "a table of ticks".to_owned(),
@@ -38,7 +38,7 @@ impl ReadError {
 }
 
 /// The log at `path`: the file, or that of the run in this folder.
-pub fn log_at(path: &Path) -> PathBuf {
+pub(crate) fn log_at(path: &Path) -> PathBuf {
     if path.is_dir() { path.join("log.mcap") } else { path.to_owned() }
 }
 

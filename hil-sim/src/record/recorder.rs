@@ -31,7 +31,7 @@ const SAME_STEP_MM: f64 = 5.0;
 
 /// The record of a run that goes on.
 #[derive(Default)]
-pub struct RunRecorder {
+pub(crate) struct RunRecorder {
     /// Digest of the controller's outputs.
     digest: Sha256,
     /// One row a tick, if they are kept.
@@ -54,7 +54,7 @@ pub struct RunRecorder {
 
 impl RunRecorder {
     /// A run from `start_mm` with this reference gap, mm.
-    pub fn new(gap_ref_mm: f64, start_mm: f64) -> Self {
+    pub(crate) fn new(gap_ref_mm: f64, start_mm: f64) -> Self {
         let summary = Summary { gap_ref_mm, ..Summary::default() };
         Self { summary, start_mm, ..Self::default() }
     }
@@ -66,7 +66,7 @@ impl RunRecorder {
 
     /// Takes a tick: the controller's state and events, the plant's `truth` before it, and the
     /// controller's columns if rows are kept.
-    pub fn take(
+    pub(crate) fn take(
         &mut self,
         telemetry: &Telemetry,
         events: &[Entry],
@@ -120,7 +120,7 @@ impl RunRecorder {
 
     /// The record of a run on `target` that took `wall_s` to compute. `arrived` is the
     /// direction of a completed run, as the controller reports it.
-    pub fn finish(
+    pub(crate) fn finish(
         self,
         target: &'static str,
         scenario: &Scenario,
@@ -237,7 +237,7 @@ impl Summary {
 }
 
 /// An event as one line of text.
-pub fn text(event: &Event) -> String {
+pub(crate) fn text(event: &Event) -> String {
     match event {
         Event::Mode(mode) => format!("mode: {}", mode_words(*mode)),
         Event::Stage(stage) => {

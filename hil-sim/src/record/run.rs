@@ -122,7 +122,7 @@ pub struct Run {
 impl Run {
     /// The scenario that the log was made with: the parameters in it, or the preset that it names
     /// if that has their hash, with these overrides, each `key=value`.
-    pub fn scenario(&self, sets: &[String]) -> Result<Scenario, Unknown> {
+    pub(crate) fn scenario(&self, sets: &[String]) -> Result<Scenario, Unknown> {
         let scenario = match (&self.parameters, &self.header) {
             (Some(toml), _) => Scenario::parse("parameters of the log", toml, sets)?,
             (None, Some(header)) => Scenario::resolve(Some(&header.rig), None, sets)?,
@@ -139,7 +139,7 @@ impl Run {
     }
 
     /// What is missing of the log, in sentences; none if nothing is known to be.
-    pub fn missing(&self) -> Vec<String> {
+    pub(crate) fn missing(&self) -> Vec<String> {
         let Counts { lost_frames, lost_ticks, .. } = self.counts;
         let (frames, ticks) = (counted(lost_frames, "frame"), counted(lost_ticks, "tick"));
         let lost = (lost_frames + lost_ticks > 0).then(|| format!("{frames} and {ticks} missing"));
@@ -163,7 +163,7 @@ impl Run {
         run
     }
 
-    pub fn add(&mut self, item: &Item) {
+    pub(crate) fn add(&mut self, item: &Item) {
         match item {
             Item::Identity(identity) => self.header = Some(identity.into()),
             Item::Tick(record, sensors) => self.rows.push(Controller::of(record, sensors)),
@@ -212,7 +212,7 @@ impl Run {
 
     /// Duties that the host asked for in the service mode, as of this tick: only a change is an
     /// event.
-    pub fn service(&self, tick: u32) -> ServiceDuties {
+    pub(crate) fn service(&self, tick: u32) -> ServiceDuties {
         let before = self.events.iter().rev().filter(|entry| entry.at <= tick);
         let mut asked = before.filter_map(|entry| match entry.event {
             Event::Service(duties) => Some(duties),

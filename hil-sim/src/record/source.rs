@@ -62,7 +62,7 @@ pub struct Bytes {
 
 impl Bytes {
     /// Reads from `input`, which is called `name`.
-    pub fn new(name: String, input: Box<dyn Read + Send>) -> Self {
+    pub(crate) fn new(name: String, input: Box<dyn Read + Send>) -> Self {
         Self { name, input }
     }
 }

@@ -22,7 +22,7 @@ use super::columns::{
 use super::summary::nan;
 use crate::plant::rig::Truth;
 
-/// Names of the numbers in [`Controller::mode`].
+/// Names of the numbers in `Controller::mode`.
 pub const MODE_NAMES: [&str; 14] = [
     "boot",
     "self-test",
@@ -46,20 +46,20 @@ pub(crate) const MOVES: std::ops::Range<u8> = 5..10;
 pub(crate) const CROSSES: std::ops::Range<u8> = 7..9;
 const FAULT_HOLD: u8 = 11;
 /// The number of a tick in which the controller did not run.
-pub const OFF: u8 = 12;
+pub(crate) const OFF: u8 = 12;
 const SERVICE: u8 = 13;
 
 /// Names of the contact stages, from number 1.
-pub const STAGE_NAMES: [&str; 6] =
+pub(crate) const STAGE_NAMES: [&str; 6] =
     ["initial", "preloaded", "static friction", "sliding", "rolling", "continuous"];
 
 /// Index of a mode into [`MODE_NAMES`].
-pub fn mode_number(mode: Mode) -> u8 {
+pub(crate) fn mode_number(mode: Mode) -> u8 {
     split(mode).0
 }
 
 /// A mode in words, with its direction and the code of a fault that is held.
-pub fn mode_words(mode: Mode) -> String {
+pub(crate) fn mode_words(mode: Mode) -> String {
     match mode {
         Mode::FaultHold(fault) => format!("{}, {}", mode.words(), fault.code()),
         _ => mode.words().to_owned(),
@@ -67,7 +67,7 @@ pub fn mode_words(mode: Mode) -> String {
 }
 
 /// Name of a contact stage's number.
-pub fn stage_name(stage: u8) -> &'static str {
+pub(crate) fn stage_name(stage: u8) -> &'static str {
     STAGE_NAMES.get(usize::from(stage).wrapping_sub(1)).copied().unwrap_or("unknown stage")
 }
 
@@ -180,7 +180,7 @@ macro_rules! controller {
 
         impl Controller {
             /// The quantities, in the order of their columns.
-            pub const QUANTITIES: &[Column] = &[$(Column {
+            pub(crate) const QUANTITIES: &[Column] = &[$(Column {
                 name: stringify!($column),
                 stage: $stage,
                 curve: [$(Some(($plot, $curve)),)? None][0],
@@ -188,7 +188,7 @@ macro_rules! controller {
             }),*];
 
             /// A tick that did not run, or is not in the log.
-            pub fn unknown(tick: u32) -> Self {
+            pub(crate) fn unknown(tick: u32) -> Self {
                 Self {
                     tick,
                     t_s: f64::from(tick) * 1e-3,
@@ -201,7 +201,7 @@ macro_rules! controller {
             }
 
             /// The columns of a record and of the codes that the tick used.
-            pub fn of(record: &Record, sensors: &SensorFrame) -> Self {
+            pub(crate) fn of(record: &Record, sensors: &SensorFrame) -> Self {
                 let Record { telemetry: seen, flags, .. } = record;
                 let (mode, retracts, fault) = split(seen.mode);
                 let arm = sensors.get(SensorId::ArmAngle, AngleFrame::new);
@@ -235,7 +235,7 @@ macro_rules! controller {
             }
 
             /// The controller's sensor codes.
-            pub fn sensors(&self) -> SensorFrame {
+            pub(crate) fn sensors(&self) -> SensorFrame {
                 let bridges = self.drive_code.zip(self.pretightener_code);
                 let mut frame = SensorFrame::default();
                 $(
@@ -254,7 +254,7 @@ macro_rules! controller {
 
             /// The controller's state in its own numbers, where the log lacks a quantity that of
             /// `absent`; none if mode or contact stage is invalid.
-            pub fn telemetry_over(&self, absent: &Telemetry) -> Option<Telemetry> {
+            pub(crate) fn telemetry_over(&self, absent: &Telemetry) -> Option<Telemetry> {
                 let duty = |value: f64| Duty::from_bits((value * DUTY).round() as i16);
                 Some(Telemetry {
                     at: self.tick,
@@ -279,12 +279,12 @@ impl Default for Controller {
 
 impl Controller {
     /// All other inputs and outputs of the tick.
-    pub const fn flags(&self) -> Flags {
+    pub(crate) const fn flags(&self) -> Flags {
         Flags(self.flags)
     }
 
     /// The mode; none if the numbers are invalid.
-    pub fn mode(&self) -> Option<Mode> {
+    pub(crate) fn mode(&self) -> Option<Mode> {
         let code = match (self.mode, self.retracts) {
             (FAULT_HOLD, _) => self.fault,
             (SERVICE, false) => SERVING,
@@ -374,7 +374,7 @@ impl Tick {
     }
 
     /// A true quantity, or where there is no truth the controller's.
-    pub fn known(
+    pub(crate) fn known(
         &self,
         truth: impl Fn(&TrueState) -> f64,
         controller: impl Fn(&Controller) -> f64,
@@ -388,7 +388,7 @@ impl Tick {
     }
 
     /// Compression of the tread, mm: the true one, or as it was measured.
-    pub fn compression_mm(&self) -> f64 {
+    pub(crate) fn compression_mm(&self) -> f64 {
         self.known(|truth| truth.compression_true_mm, |seen| seen.compression_mm)
     }
 }

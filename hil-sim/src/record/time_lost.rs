@@ -42,7 +42,7 @@ impl TimeLost {
 
     /// Each part to a millisecond, and their sum. The travel takes the rounding, so that the printed
     /// parts add up.
-    pub fn sentence(&self) -> String {
+    pub(crate) fn sentence(&self) -> String {
         let round = |s: f64| (s * 1e3).round() / 1e3;
         let parts = self.parts().map(|part| round(part.0));
         let sum_s = round(self.cruise_s + self.parts().iter().map(|part| part.0).sum::<f64>());

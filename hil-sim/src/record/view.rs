@@ -36,7 +36,7 @@ pub(crate) fn shown(record: &Record, sensors: &SensorFrame) -> Controller {
 
 /// The latest items of a log, and its rates.
 #[derive(Default)]
-pub struct View {
+pub(crate) struct View {
     row: Option<Controller>,
     rig: Option<String>,
     event: String,
@@ -47,7 +47,7 @@ pub struct View {
 }
 
 impl View {
-    pub fn see(&mut self, item: &Item) {
+    pub(crate) fn see(&mut self, item: &Item) {
         match item {
             Item::Tick(record, sensors) => self.row = Some(shown(record, sensors)),
             Item::Identity(identity) => self.rig = Some(identity.rig.as_str().to_owned()),
@@ -58,7 +58,7 @@ impl View {
     }
 
     /// Computes the rates at most once in half a second; returns whether it did.
-    pub fn count(&mut self, counts: &Counts) -> bool {
+    pub(crate) fn count(&mut self, counts: &Counts) -> bool {
         let (since, before) =
             self.counted.get_or_insert_with(|| (Instant::now(), Counts::default()));
         let passed = since.elapsed().as_secs_f64();
@@ -71,7 +71,7 @@ impl View {
         true
     }
 
-    pub const fn row(&self) -> Option<&Controller> {
+    pub(crate) const fn row(&self) -> Option<&Controller> {
         self.row.as_ref()
     }
 
@@ -115,7 +115,7 @@ impl View {
     }
 
     /// The state as a few lines.
-    pub fn text(&self, counts: &Counts) -> String {
+    pub(crate) fn text(&self, counts: &Counts) -> String {
         let mut lines = vec![self.rates_text(counts)];
         lines.extend(self.row.map(|_| self.state_text()));
         lines.extend((!self.event.is_empty()).then(|| format!("  {}", self.event)));

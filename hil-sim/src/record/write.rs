@@ -107,18 +107,18 @@ impl<M: Write + Seek, C: Write> Writer<M, C> {
     }
 
     /// Adds the controller's parameters, as TOML, to the MCAP file.
-    pub fn parameters(&mut self, toml: &str) -> Result<(), WriteError> {
+    pub(crate) fn parameters(&mut self, toml: &str) -> Result<(), WriteError> {
         let written = self.mcap.as_mut().map_or(Ok(()), |mcap| mcap.parameters(toml));
         written.map_err(|source| self.failed(source))
     }
 
     /// The target's identity, as soon as it has come.
-    pub const fn header(&self) -> Option<&Header> {
+    pub(crate) const fn header(&self) -> Option<&Header> {
         self.header.as_ref()
     }
 
     /// What has been read so far.
-    pub const fn counts(&self) -> &Counts {
+    pub(crate) const fn counts(&self) -> &Counts {
         self.decoder.counts()
     }
 

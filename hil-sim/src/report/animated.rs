@@ -29,7 +29,7 @@ const FRAMES: usize = 60;
 const MOVE: &str = "animateTransform attributeName=\"transform\" type=\"translate\"";
 
 /// The second crossing of the run, the first where there is no other; none without one.
-pub fn animated_svg(recording: &Recording) -> Option<String> {
+pub(crate) fn animated_svg(recording: &Recording) -> Option<String> {
     let recording = &recording.since_command();
     let scene = Scene::new(recording)?;
     let place = scene.crossings.len().checked_sub(1)?.min(1);

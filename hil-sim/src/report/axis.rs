@@ -1,6 +1,6 @@
 //! Ranges and tick marks of axes.
 
-pub use crate::table::label;
+pub(crate) use crate::table::label;
 
 /// What an axis shows.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -16,7 +16,7 @@ use crate::table::number;
 
 /// A difference between the two runs at a crossing.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
-pub struct Difference {
+pub(crate) struct Difference {
     /// Step number.
     pub index: u8,
     pub quantity: &'static str,
@@ -32,7 +32,7 @@ pub struct Difference {
 }
 
 /// Every quantity of a crossing in either run; crossings of one step are paired in their order.
-pub fn differences(a: &Recording, b: &Recording) -> Vec<Difference> {
+pub(crate) fn differences(a: &Recording, b: &Recording) -> Vec<Difference> {
     let mut all = Vec::new();
     for (index, a, b) in pairs(a, b) {
         for Column { name: quantity, unit, decimals, of, .. } in COLUMNS {
@@ -63,7 +63,10 @@ fn pairs<'a>(a: &'a Recording, b: &'a Recording) -> Vec<Pair<'a>> {
 }
 
 /// The page of two runs with their names, each on the time since its command.
-pub fn compare_html((name_a, a): (&str, &Recording), (name_b, b): (&str, &Recording)) -> String {
+pub(crate) fn compare_html(
+    (name_a, a): (&str, &Recording),
+    (name_b, b): (&str, &Recording),
+) -> String {
     let (a, b) = (&a.since_command(), &b.since_command());
     let mut page = head("two runs");
     for (letter, name, run) in [("A", name_a, a), ("B", name_b, b)] {
@@ -118,7 +121,7 @@ fn parameters(a: &Recording, b: &Recording) -> String {
 }
 
 /// The differences as a table's head and rows.
-pub fn table(differences: &[Difference]) -> (Vec<String>, Vec<Vec<String>>) {
+pub(crate) fn table(differences: &[Difference]) -> (Vec<String>, Vec<Vec<String>>) {
     let head = ["step", "quantity", "A", "B", "B - A"].map(str::to_owned).to_vec();
     let rows =
         differences.iter().map(|Difference { index, quantity, unit, decimals, a, b, change }| {
@@ -137,7 +140,7 @@ const LOOKS: [(Colour, f64, Shape); 3] = [
 ];
 
 /// The picture of up to three runs with their names: preload, position, slip and gap.
-pub fn beside_svg(runs: &[(String, &Recording)]) -> String {
+pub(crate) fn beside_svg(runs: &[(String, &Recording)]) -> String {
     let own: Vec<_> = runs.iter().map(|(name, run)| (&**name, run.since_command())).collect();
     let own: Vec<_> = own.iter().map(|(name, run)| (*name, run)).collect();
     sheet(panels(&own), 1, true)

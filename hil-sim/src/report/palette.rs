@@ -2,9 +2,9 @@
 //! dashed, measurements and estimates have the quantity's colour.
 
 /// A colour as SVG and HTML write it.
-pub type Colour = &'static str;
+pub(crate) type Colour = &'static str;
 
-pub const TRUTH: Colour = "#1f2937";
+pub(crate) const TRUTH: Colour = "#1f2937";
 /// References; drawn dashed.
 pub(crate) const WANTED: Colour = "#6b7280";
 /// Limits; drawn dashed.
@@ -21,21 +21,21 @@ pub(crate) const WARNING: Colour = "#a16207";
 /// Simulated by the reference models; drawn dashed.
 pub const SIMULATED: Colour = "#1c6fd6";
 
-pub const SPEED: Colour = "#1d7fe0";
+pub(crate) const SPEED: Colour = "#1d7fe0";
 pub const PRELOAD: Colour = "#e07b12";
 pub const GAP: Colour = "#d02f6b";
-pub const RADIUS: Colour = "#0f9797";
-pub const SLIP: Colour = "#35a14a";
+pub(crate) const RADIUS: Colour = "#0f9797";
+pub(crate) const SLIP: Colour = "#35a14a";
 /// Compression of the tread.
-pub const COMPRESSION: Colour = "#805ad5";
+pub(crate) const COMPRESSION: Colour = "#805ad5";
 /// Force on the lower wall.
 pub(crate) const FLOOR: Colour = "#3d8eb9";
 
-pub const TEXT: Colour = "#374151";
+pub(crate) const TEXT: Colour = "#374151";
 /// Axes.
 pub(crate) const AXIS: Colour = "#9ca3af";
 /// Lines of the grid.
-pub const GRID: Colour = "#e9ebef";
+pub(crate) const GRID: Colour = "#e9ebef";
 /// Shaded stretches.
 pub(crate) const SHADE: Colour = "#faf1df";
 

@@ -282,7 +282,7 @@ fn reports(recording: &Recording, across: Across) -> Vec<Rule> {
 }
 
 /// Speed, preload, gap and radius of a run over time from the command on, as an SVG.
-pub fn overview_svg(recording: &Recording) -> String {
+pub(crate) fn overview_svg(recording: &Recording) -> String {
     let recording = &recording.since_command();
     let view = View::new(recording, Across::Time);
     sheet(vec![view.speed(), view.preload(), view.gap(), view.radius()], 1, false)

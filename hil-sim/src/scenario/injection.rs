@@ -212,7 +212,7 @@ fn word(value: impl Serialize) -> String {
 }
 
 impl Target {
-    pub fn name(self) -> String {
+    pub(crate) fn name(self) -> String {
         word(self)
     }
 
@@ -223,7 +223,7 @@ impl Target {
     }
 
     /// Whether such a fault of it resets the board, at once or by the watchdog.
-    pub const fn resets_board(self, kind: Kind) -> bool {
+    pub(crate) const fn resets_board(self, kind: Kind) -> bool {
         match self {
             Self::ResetPin | Self::Processor => true,
             Self::Debugger => matches!(kind, Kind::Reset),
@@ -241,12 +241,6 @@ impl Target {
     pub const fn is_of_start(self) -> bool {
         self.is_of_sets() || matches!(self, Self::OptionBytes)
     }
-
-    /// Whether a fault of it changes forces or motion of the plant directly.
-    pub const fn moves(self) -> bool {
-        use Target::{Drive, Load, Pretightener, Spring, Tread, Wheel};
-        matches!(self, Drive | Pretightener | Wheel | Tread | Spring | Load)
-    }
 }
 
 impl Kind {
@@ -257,7 +251,7 @@ impl Kind {
         matches!(self, Off | Stuck | Reversed | Delayed | Runaway | Regulating)
     }
 
-    pub fn name(self) -> String {
+    pub(crate) fn name(self) -> String {
         word(self)
     }
 }

@@ -11,7 +11,7 @@ use crate::plant::sensors::Noise;
 use crate::plant::spread::Spread;
 use crate::plant::spread::{Field, Section};
 
-pub const PRESETS: [&str; 2] = ["prototype", "fe"];
+pub(crate) const PRESETS: [&str; 2] = ["prototype", "fe"];
 
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct KeyInfo {

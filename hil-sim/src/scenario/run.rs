@@ -130,7 +130,7 @@ pub enum StepAnomaly {
 
 impl StepAnomaly {
     /// Codes that name it.
-    pub const fn codes(&self) -> &'static [u16] {
+    pub(crate) const fn codes(&self) -> &'static [u16] {
         match self {
             Self::Early { .. } => &[201, 124],
             Self::Late { .. } => &[202, 203, 124],

@@ -8,20 +8,20 @@ use interstage::tick::{Controller, Entry, Event, Input, Output};
 use crate::scenario::Scenario;
 
 /// The binary log of a run. Its channel is never full.
-pub struct Stream {
+pub(crate) struct Stream {
     encoder: LogEncoder,
     bytes: Vec<u8>,
 }
 
 impl Stream {
     /// A log of this controller from its first tick on.
-    pub fn new(scenario: &Scenario, controller: &Controller) -> Self {
+    pub(crate) fn new(scenario: &Scenario, controller: &Controller) -> Self {
         Self { encoder: LogEncoder::new(of(scenario, controller)), bytes: Vec::new() }
     }
 
     /// Keeps a tick and its events, as the journal task does on the board; drops them unless
     /// the log is read.
-    pub fn keep(&mut self, input: &Input, output: &Output, read: bool) {
+    pub(crate) fn keep(&mut self, input: &Input, output: &Output, read: bool) {
         let mut send = |frame: &[u8]| {
             if read {
                 self.bytes.extend_from_slice(frame);
@@ -41,7 +41,7 @@ impl Stream {
     }
 
     /// The bytes since the last call, at the log's `end` with what is not sent yet.
-    pub fn take(&mut self, end: bool) -> Vec<u8> {
+    pub(crate) fn take(&mut self, end: bool) -> Vec<u8> {
         if end {
             self.encoder.flush(&mut into(&mut self.bytes));
         }

@@ -48,11 +48,11 @@ pub enum Course {
 }
 
 impl Course {
-    pub const ALL: [Self; 5] =
+    pub(crate) const ALL: [Self; 5] =
         [Self::Forward, Self::Back, Self::Reversing, Self::Rocking, Self::Coasting];
 
     /// Speed in parts of the full one at this part of the run.
-    pub fn speed(self, part: f64) -> f64 {
+    pub(crate) fn speed(self, part: f64) -> f64 {
         match self {
             Self::Forward => 1.0,
             Self::Back => -1.0,

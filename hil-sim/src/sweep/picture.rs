@@ -11,7 +11,7 @@ use crate::scenario::brief;
 
 /// A figure of the rows that is plotted.
 #[derive(Clone, Copy, Debug)]
-pub struct Plot {
+pub(crate) struct Plot {
     /// Its name in the rows.
     pub column: &'static str,
     pub title: &'static str,
@@ -20,7 +20,11 @@ pub struct Plot {
 }
 
 /// The picture as SVG; none if no key has numbers.
-pub fn picture(axes: &[Axis], rows: &[Map<String, Value>], plots: &[Plot]) -> Option<String> {
+pub(crate) fn picture(
+    axes: &[Axis],
+    rows: &[Map<String, Value>],
+    plots: &[Plot],
+) -> Option<String> {
     let is_numeric = |axis: &&Axis| axis.values.iter().all(|value| value.parse::<f64>().is_ok());
     let x = axes.iter().find(is_numeric)?;
     let others: Vec<&Axis> = axes.iter().filter(|axis| axis.key != x.key).collect();

@@ -14,5 +14,5 @@ pub mod impact;
 pub mod rubber;
 pub mod vibration;
 
-pub use case::{ReferenceCase, Resolution};
+pub use case::ReferenceCase;
 pub use rubber::Rubber;

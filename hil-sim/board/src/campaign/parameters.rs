@@ -72,7 +72,7 @@ pub(super) fn judged(
     if saving.is_none() && !before {
         power_cycle(&mut board, &mut trial.judge)?;
     }
-    let mut harms = trial.judge.harms();
+    let mut harms = trial.harms();
     harms.extend(harm(&board, scenario, injection)?);
     let held = board.parameters.holds();
     use Target::{ImageSet, OptionBytes, StoredSet};

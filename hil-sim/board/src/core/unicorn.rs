@@ -41,13 +41,6 @@ pub struct Memory {
     pub access: Access,
 }
 
-impl Memory {
-    /// Whether this address lies in it.
-    pub const fn holds(self, address: u32) -> bool {
-        address >= self.base && address - self.base < self.size
-    }
-}
-
 /// What a program may do in a memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Access {

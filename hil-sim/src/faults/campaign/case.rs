@@ -108,7 +108,7 @@ impl Case {
     }
 
     /// What happens, in words.
-    pub fn text(&self) -> String {
+    pub(crate) fn text(&self) -> String {
         match self {
             Self::Injected(entry) if entry.unit.is_empty() => entry.text.to_owned(),
             Self::Injected(entry) => {

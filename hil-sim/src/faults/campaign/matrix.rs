@@ -73,7 +73,7 @@ impl MatrixRow {
     }
 
     /// The row of a fault.
-    pub fn of(case: &Case, instants: &[Instant]) -> Self {
+    pub(crate) fn of(case: &Case, instants: &[Instant]) -> Self {
         let count = |finding| instants.iter().filter(|i| i.finding == finding).count();
         let codes = counts(instants.iter().filter_map(|i| i.code));
         let failed = |i: &&Instant| i.finding == Finding::Undetected || !i.harms.is_empty();
@@ -136,7 +136,7 @@ pub struct Outcome {
 
 impl Outcome {
     /// The outcome of these rows.
-    pub fn of(target: &'static str, matrix: Vec<MatrixRow>, instants: usize) -> Self {
+    pub(crate) fn of(target: &'static str, matrix: Vec<MatrixRow>, instants: usize) -> Self {
         let otherwise = matrix.iter().map(|line| line.otherwise).sum();
         let undetected = matrix.iter().map(|line| line.undetected).sum();
         let unheld = matrix.iter().map(|line| line.unheld).sum();
@@ -144,7 +144,7 @@ impl Outcome {
     }
 
     /// Whether every fault was found or tolerated and every bound kept.
-    pub const fn is_good(&self) -> bool {
+    pub(crate) const fn is_good(&self) -> bool {
         self.undetected == 0 && self.unheld == 0
     }
 }

@@ -57,7 +57,7 @@ impl Twin {
     }
 
     /// A random instant: of every three, one in a crossing and two anywhere in the run.
-    pub fn instant(&self, number: usize, random: &mut ChaCha8Rng) -> f64 {
+    pub(crate) fn instant(&self, number: usize, random: &mut ChaCha8Rng) -> f64 {
         let (from_s, to_s) = if number % 3 == 2 && !self.crossings.is_empty() {
             self.crossings[random.random_range(0..self.crossings.len())]
         } else {
@@ -81,7 +81,7 @@ pub struct Operator {
 
 impl Operator {
     /// The command of a tick in which the drive is in this mode.
-    pub fn command(&mut self, mode: Mode) -> Option<Command> {
+    pub(crate) fn command(&mut self, mode: Mode) -> Option<Command> {
         if mode == Mode::Idle && !self.started {
             self.started = true;
             return Some(if self.turned { Command::Retract } else { Command::Start });
@@ -97,17 +97,12 @@ impl Operator {
     }
 
     /// The controller has restarted: the last command is given again.
-    pub const fn press_again(&mut self) {
+    pub(crate) const fn press_again(&mut self) {
         self.started = false;
     }
 
-    /// Whether the run has been started.
-    pub const fn started(&self) -> bool {
-        self.started
-    }
-
     /// Whether it is over: at rest, and no further command comes.
-    pub fn over(&self, mode: Mode) -> bool {
+    pub(crate) fn over(&self, mode: Mode) -> bool {
         self.started
             && mode.is_at_rest()
             && (mode != Mode::Complete(Direction::Deploy) || self.turned)

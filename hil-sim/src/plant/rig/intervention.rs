@@ -27,7 +27,7 @@ impl VirtualRig {
     }
 
     /// Mean friction of tread on wall becomes this.
-    pub fn set_friction(&mut self, mu: f64) {
+    pub(crate) fn set_friction(&mut self, mu: f64) {
         self.parameters.mu = mu;
     }
 

@@ -49,16 +49,16 @@ impl RingParameters {
     }
 
     /// Whether the elements are coupled.
-    pub fn is_coupled(&self) -> bool {
+    pub(crate) fn is_coupled(&self) -> bool {
         self.tread_thickness_mm > 0.0
     }
 
-    pub fn relaxes_twice(&self) -> bool {
+    pub(crate) fn relaxes_twice(&self) -> bool {
         self.second_relaxation > 1.0
     }
 
     /// Relaxation times, the faster one first, s.
-    pub fn relaxations_s(&self) -> [f64; 2] {
+    pub(crate) fn relaxations_s(&self) -> [f64; 2] {
         [self.tau_s / self.second_relaxation, self.tau_s * self.second_relaxation]
     }
 }
@@ -93,7 +93,7 @@ pub struct Contact {
 
 impl Contact {
     /// The contact a little higher up, by its derivatives, its parts as the whole.
-    pub fn moved(self, change_mm: f64) -> Self {
+    pub(crate) fn moved(self, change_mm: f64) -> Self {
         let cosine_n = self.cosine_n + self.slope.0 * change_mm;
         let part = cosine_n / self.cosine_n;
         Self {
@@ -109,7 +109,7 @@ impl Contact {
     }
 
     /// Magnitude of the step's force on the wheel, N.
-    pub fn step_force_n(&self) -> f64 {
+    pub(crate) fn step_force_n(&self) -> f64 {
         self.step_cosine_n.hypot(self.step_sine_n)
     }
 }

@@ -56,13 +56,13 @@ pub fn deployment(case: &Case, arms: &Arms) -> Result<History> {
             ReferenceCase::new(rig.clone(), case.speed_mm_s, case.pressing_n(level)).driven();
         let crossing = dynamic(&reference)?;
         let mut rod = Rod::tread(Rubber::of(&reference), CELLS);
-        let before = crossing.samples.iter().filter(|sample| sample.t_s < 0.0);
+        let before = crossing.iter().filter(|sample| sample.t_s < 0.0);
         let (axial, floor) =
             before.fold((0.0, 0.0), |(a, b), sample| (a + sample.axial_n, b + sample.floor_n));
         let resistance = if floor > 0.0 { axial / floor } else { 0.0 };
         // Until the next crossing begins.
         let next = steps.get(level + 1).map_or(rig.rig.travel_mm, |next| next - BEGINS_MM);
-        for sample in crossing.samples.iter().filter(|sample| step + sample.x_mm < next) {
+        for sample in crossing.iter().filter(|sample| step + sample.x_mm < next) {
             let time_s = (step + sample.x_mm) / case.speed_mm_s;
             let dt_s = time_s - last_s;
             if dt_s <= 0.0 {

@@ -20,8 +20,6 @@ pub struct Resolution {
 impl Resolution {
     /// For histories: gap and force within 0.1 % of the converged ones.
     pub const HISTORY: Self = Self { elements: 2880, stride_mm: 0.01, step_s: 2e-4 };
-    /// For figures: gap and force within 0.02 % of the converged ones.
-    pub const FIGURE: Self = Self { elements: 5760, stride_mm: 0.005, step_s: 2e-4 };
 }
 
 /// One crossing of one step while deploying.

@@ -35,32 +35,11 @@ pub struct Sample {
     pub radial_n: f64,
     /// Part of it that the lower wall carries, N.
     pub floor_n: f64,
-    /// Mean pressure of the contact, Pa; 0 without contact.
-    pub pressure_pa: f64,
-    /// Contact area, mm^2, averaged over the travel of one element: elements enter and
-    /// leave as a whole.
-    pub area_mm2: f64,
     /// Clearance between step root and undeformed wheel, mm.
     pub clearance_mm: f64,
 }
 
-/// One crossing over time.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Crossing {
-    /// From shortly before the touch until the wheel rolls on the upper wall.
-    pub samples: Vec<Sample>,
-    /// Mean contact pressure of steady rolling before the step, Pa.
-    pub cruise_pressure_pa: f64,
-}
-
-impl Crossing {
-    /// Largest force against the motion, N.
-    pub fn peak_n(&self) -> f64 {
-        self.samples.iter().map(|sample| sample.axial_n).fold(0.0, f64::max)
-    }
-}
-
-/// The crossing with inertia.
+/// The crossing with inertia, from shortly before the touch until the wheel rolls on the upper wall.
 ///
 /// Equation: `m y'' = C(y, memory) - P`, C the radial force of ring elements with the
 /// memory of the three-parameter solid, `sum of p cos(psi) R dpsi L` with p >= 0, by the
@@ -70,7 +49,7 @@ impl Crossing {
 /// `(omega dt)^2/12`, 0.2 % at 0.2 ms and 800 rad/s.
 /// Cost: some 10^4 steps of a few hundred elements.
 /// Source: derived; as the mass or the speed falls it becomes the quasi-static crossing.
-pub fn dynamic(case: &ReferenceCase) -> Result<Crossing, BalanceError> {
+pub fn dynamic(case: &ReferenceCase) -> Result<Vec<Sample>, BalanceError> {
     let radius = case.rig.rig.wheel_radius_mm;
     let height = case.rig.rig.step_height_mm;
     let wall = Wall::new(vec![Step { position_mm: 0.0, height_mm: height }]);
@@ -122,43 +101,11 @@ pub fn dynamic(case: &ReferenceCase) -> Result<Crossing, BalanceError> {
             axial_n: contact.sine_n,
             radial_n: contact.cosine_n + utilisation * contact.sine_n,
             floor_n: contact.floor_n,
-            // The normal force, until the area is averaged.
-            pressure_pa: contact.normal_n,
-            area_mm2: contact.area_mm2,
             clearance_mm: x.hypot(y_mm) - radius,
         });
     }
-    Ok(finished(samples, touch_s.unwrap_or(0.0), case))
-}
-
-/// The crossing with its time counted from the touch and its areas averaged.
-fn finished(mut samples: Vec<Sample>, touch_s: f64, case: &ReferenceCase) -> Crossing {
-    let ring = case.ring();
-    let areas = averaged(&samples, ring.pitch_mm());
-    for (sample, area_mm2) in samples.iter_mut().zip(areas) {
-        sample.t_s -= touch_s;
-        sample.area_mm2 = area_mm2;
-        let mean_pa = 1e6 * sample.pressure_pa / area_mm2;
-        sample.pressure_pa = if area_mm2 > 0.0 { mean_pa } else { 0.0 };
-    }
-    // Steady until the touch.
-    let cruise: Vec<f64> = samples.iter().filter(|s| s.t_s < 0.0).map(|s| s.pressure_pa).collect();
-    let cruise_pressure_pa = cruise.iter().sum::<f64>() / cruise.len().max(1) as f64;
-    Crossing { samples, cruise_pressure_pa }
-}
-
-/// The contact area, averaged over `travel_mm` around each sample.
-fn averaged(samples: &[Sample], travel_mm: f64) -> Vec<f64> {
-    let mut sums = vec![0.0];
-    for sample in samples {
-        sums.push(sums[sums.len() - 1] + sample.area_mm2);
-    }
-    let within = |sample: &Sample| {
-        let from = samples.partition_point(|s| s.x_mm <= sample.x_mm - 0.5 * travel_mm);
-        let to = samples.partition_point(|s| s.x_mm <= sample.x_mm + 0.5 * travel_mm);
-        (sums[to] - sums[from]) / (to - from).max(1) as f64
-    };
-    samples.iter().map(within).collect()
+    samples.iter_mut().for_each(|sample| sample.t_s -= touch_s.unwrap_or(0.0));
+    Ok(samples)
 }
 
 /// The radial motion of what moves.

@@ -11,18 +11,10 @@
 
 use super::Rubber;
 use super::beam::Beam;
-use super::case::ReferenceCase;
-use super::collision::Crossing;
 use super::rubber::THICKNESS_MM;
 
 #[cfg(test)]
 mod tests;
-
-/// Cells across the tread for [`stress`].
-const CELLS: usize = 16;
-
-/// Time between the values of [`stress`], s.
-const SAMPLE_S: f64 = 1e-3;
 
 /// A rod at some time. Pressure and inward motion are positive.
 #[derive(Clone, Debug)]
@@ -127,30 +119,4 @@ impl Rod {
             self.strain[cell] += self.pressure_pa(cell) / instant;
         }
     }
-}
-
-/// Time, s, from the touch of the corner on, and the stress increment at the hub, Pa:
-/// the mean pressure of the contact above that of steady rolling (the study: what the
-/// collision adds to the preload), sent through the tread as positive and negative waves.
-///
-/// The stress at the hub is that on the face a transit before, to some thousandths of its
-/// peak.
-pub fn stress(case: &ReferenceCase, crossing: &Crossing) -> Vec<(f64, f64)> {
-    let mut rod = Rod::tread(Rubber::of(case), CELLS);
-    let first_s = crossing.samples[0].t_s;
-    let (mut t, mut next) = (first_s, first_s);
-    let mut history = Vec::new();
-    for pair in crossing.samples.windows(2) {
-        let rate = (pair[1].pressure_pa - pair[0].pressure_pa) / (pair[1].t_s - pair[0].t_s);
-        while t < pair[1].t_s {
-            let pressure = pair[0].pressure_pa + rate * (t - pair[0].t_s);
-            rod.step(pressure - crossing.cruise_pressure_pa);
-            t += rod.step_s();
-            if t >= next {
-                history.push((t, rod.hub_pa()));
-                next += SAMPLE_S;
-            }
-        }
-    }
-    history
 }

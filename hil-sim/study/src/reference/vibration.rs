@@ -2,9 +2,8 @@
 //!
 //! The study turns the stress waves of the impact into the excitation of a beam (41-56)
 //! and takes the amplitude of that beam for the contact gap. Here the collision force
-//! bends the arm, a beam with the wheel as a mass at its tip, and the amplitude is what it
-//! is: tenths of a millimetre of static bending, less than a micrometre of vibration. The
-//! published millimetres are the clearance at the step root.
+//! bends the arm, a beam with the wheel as a mass at its tip, and its amplitude is what it
+//! is. The published millimetres are the clearance at the step root.
 
 use std::f64::consts::TAU;
 
@@ -12,8 +11,6 @@ use interstage::rig::Rig;
 use nalgebra::Complex;
 
 use super::beam::{Beam, BeamError, Ends, Shape, Tip};
-use super::case::ReferenceCase;
-use super::collision::Crossing;
 
 #[cfg(test)]
 mod tests;
@@ -30,9 +27,6 @@ const LOSS_FACTOR: f64 = 0.02;
 
 /// Modes that move; those beyond, above 20 kHz, follow the force at once.
 pub const MODES: usize = 6;
-
-/// Time between the values of [`bending`], s.
-const SAMPLE_S: f64 = 1e-3;
 
 /// The drive arm, clamped at the pillar, with what is at the wheel as a point mass.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -63,20 +57,6 @@ impl Arm {
         let sine = (reach / geometry.arm_length_mm).clamp(-1.0, 1.0);
         let tip = Tip { mass_kg, spring_n_per_m: 0.0 };
         Ok(Self { beam, tip, angle_rad: sine.asin(), loss_factor: LOSS_FACTOR })
-    }
-
-    /// The arm with the tread as a spring to the wall: stiffness per area at once times the
-    /// patch, mm^2, by its part across the arm.
-    pub fn on_tread(self, case: &ReferenceCase, patch_mm2: f64) -> Self {
-        let radial = case.instant_pa_per_m() * patch_mm2 * 1e-6;
-        let spring_n_per_m = radial * self.angle_rad.cos().powi(2);
-        Self { tip: Tip { spring_n_per_m, ..self.tip }, ..self }
-    }
-
-    /// Frequencies of its first `count` modes, Hz.
-    pub fn frequencies_hz(&self, count: usize) -> Result<Vec<f64>, BeamError> {
-        let modes = self.beam.modes(Ends::ClampedFree, self.tip, count)?;
-        Ok(modes.iter().map(|mode| mode.frequency_hz).collect())
     }
 
     /// Deflection at the tip per static force there, m/N: `L^3/(3 EI)`, and the spring.
@@ -129,8 +109,7 @@ struct Oscillator {
 #[derive(Clone, Debug)]
 pub struct Modal {
     oscillators: Vec<Oscillator>,
-    /// Static deflection per force, and the part of it that the modes left out give, m/N.
-    compliance: f64,
+    /// Static deflection per force that the modes left out give, m/N.
     rest_compliance: f64,
     force_n: f64,
 }
@@ -149,14 +128,7 @@ impl Modal {
             })
             .collect();
         let held: f64 = oscillators.iter().map(|o| (o.gain / o.omega).powi(2)).sum();
-        Self { oscillators, compliance, rest_compliance: compliance - held, force_n: 0.0 }
-    }
-
-    pub fn rest(&mut self, force_n: f64) {
-        self.force_n = force_n;
-        for oscillator in &mut self.oscillators {
-            oscillator.state = (oscillator.gain * force_n / oscillator.omega.powi(2), 0.0);
-        }
+        Self { oscillators, rest_compliance: compliance - held, force_n: 0.0 }
     }
 
     /// Runs the force linearly to `force_n` within `dt_s`, which must be above 0.
@@ -175,11 +147,6 @@ impl Modal {
         let modes: f64 = self.oscillators.iter().map(|o| o.gain * o.state.0).sum();
         modes + self.rest_compliance * self.force_n
     }
-
-    /// Deflection beyond the static one of the same force, m.
-    pub fn vibration_m(&self) -> f64 {
-        self.deflection_m() - self.compliance * self.force_n
-    }
 }
 
 impl Oscillator {
@@ -196,46 +163,4 @@ impl Oscillator {
         let speed = decay * ((cos - a * sin) * v - w * w * b * sin * u);
         self.state = (still(force_n + rate * dt) + moved, drift + speed);
     }
-}
-
-/// The arm's motion at the wheel at one instant.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Bending {
-    /// Time since the touch of the corner, s.
-    pub t_s: f64,
-    /// Deflection at the wheel across the arm, mm.
-    pub deflection_mm: f64,
-    /// Part of it beyond the static deflection, mm: the vibration.
-    pub vibration_mm: f64,
-}
-
-/// Deflection at the wheel across the arm under what the crossing adds to the force of
-/// steady rolling: the collision force and what accelerates the wheel radially, each by
-/// its part across the inclined arm.
-pub fn bending(case: &ReferenceCase, crossing: &Crossing) -> Result<Vec<Bending>, BeamError> {
-    let arm = Arm::of(&case.rig)?;
-    let rolling: Vec<f64> =
-        crossing.samples.iter().filter(|s| s.t_s < 0.0).map(|s| s.axial_n).collect();
-    let steady = rolling.iter().sum::<f64>() / rolling.len().max(1) as f64;
-    let (sin, cos) = arm.angle_rad.sin_cos();
-    let mut modal = arm.modal(MODES)?;
-    let mut history = Vec::new();
-    let mut next = f64::NEG_INFINITY;
-    let mut last_s: Option<f64> = None;
-    for sample in &crossing.samples {
-        let t_s = sample.t_s;
-        let force_n = (sample.axial_n - steady) * sin + (sample.radial_n - case.preload_n) * cos;
-        let Some(before_s) = last_s.replace(t_s) else {
-            modal.rest(force_n);
-            continue;
-        };
-        modal.step(force_n, t_s - before_s);
-        if t_s >= next {
-            let deflection_mm = 1e3 * modal.deflection_m();
-            let vibration_mm = 1e3 * modal.vibration_m();
-            history.push(Bending { t_s, deflection_mm, vibration_mm });
-            next = t_s + SAMPLE_S;
-        }
-    }
-    Ok(history)
 }

@@ -3,19 +3,9 @@
 use proptest::prelude::*;
 
 use super::*;
-use crate::reference::collision::dynamic;
 
 fn arm() -> Arm {
     Arm::of(&Rig::fe()).unwrap()
-}
-
-#[test]
-fn on_its_tread_the_arm_is_stiffer() {
-    let held = arm().on_tread(&ReferenceCase::first(), 250.0);
-    let spring = held.tip.spring_n_per_m;
-    assert!((spring / 304e3 - 1.0).abs() < 0.01, "{spring}");
-    let (held, free) = (held.frequencies_hz(3).unwrap(), arm().frequencies_hz(3).unwrap());
-    assert!(held.iter().zip(&free).all(|(held, free)| held > free), "{held:?} {free:?}");
 }
 
 /// Tip receptance of a cantilever with a mass, m/N (Bishop and Johnson), for complex `E I`:
@@ -55,11 +45,6 @@ fn it_settles_to_the_static_deflection() {
     }
     let wanted = 50.0 * arm.beam.length_m.powi(3) / (3.0 * 244.6875);
     assert!((modal.deflection_m() / wanted - 1.0).abs() < 1e-9);
-    assert!(modal.vibration_m().abs() < 1e-9 * wanted);
-    let mut held = arm.modal(4).unwrap();
-    held.rest(50.0);
-    held.step(50.0, 0.3);
-    assert!((held.deflection_m() / wanted - 1.0).abs() < 1e-9);
 }
 
 #[test]
@@ -83,40 +68,6 @@ fn a_sine_is_followed_as_its_straight_pieces_get_short() {
     // (omega dt)^2/12 of the force is lost with the corners; 2.1 is the resonance.
     let lost = (omega * dt).powi(2) / 12.0;
     assert!(worst < 2.2 * lost * gain / own.powi(2), "{worst:e}");
-}
-
-/// The history at this speed, and the static deflection under its climbing force, mm.
-fn history(speed_mm_s: f64) -> (Vec<Bending>, f64) {
-    let case = ReferenceCase { speed_mm_s, ..ReferenceCase::first() };
-    let crossing = dynamic(&case).unwrap();
-    let climb = crossing.peak_n() - crossing.samples[0].axial_n;
-    (bending(&case, &crossing).unwrap(), climb * arm().compliance_m_per_n() * 1e3)
-}
-
-fn shaken(history: &[Bending], before_s: f64) -> f64 {
-    let climbing = history.iter().filter(|now| now.t_s < before_s);
-    climbing.map(|now| now.vibration_mm.abs()).fold(0.0, f64::max)
-}
-
-#[test]
-fn at_millimetres_per_second_the_arm_bends_as_under_a_static_force() {
-    let (history, static_mm) = history(5.0);
-    let most = history.iter().map(|now| now.deflection_mm).fold(0.0, f64::max);
-    // sin(46.4 deg) of the climbing force, less rolling resistance, lies across the arm.
-    assert!((most / (0.724 * static_mm) - 1.0).abs() < 0.01, "{most} {static_mm}");
-    assert!((0.1..0.25).contains(&most), "{most}");
-    assert!(shaken(&history, 2.0) < 0.01 * most);
-    // Nothing moves before the touch.
-    for now in history.iter().filter(|now| now.t_s < -0.02) {
-        assert!(now.deflection_mm.abs() < 0.02 * static_mm, "{now:?}");
-    }
-}
-
-#[test]
-fn vibration_grows_with_speed() {
-    // Before the edge passes under the centre, where single elements shake the ring.
-    let [slow, medium, fast] = [8.0, 50.0, 400.0].map(|v| shaken(&history(v).0, 10.0 / v));
-    assert!(slow < medium && medium < fast, "{slow} {medium} {fast}");
 }
 
 proptest! {
@@ -149,7 +100,7 @@ proptest! {
     #[test]
     fn left_alone_it_only_calms_down(force in 1.0..100.0_f64, dt in 1e-5..1e-1_f64) {
         let mut modal = arm().modal(1).unwrap();
-        modal.rest(force);
+        modal.step(force, 1e-3);
         modal.step(0.0, 1e-6);
         let energy = |modal: &Modal| {
             let o = modal.oscillators[0];
