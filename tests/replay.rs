@@ -231,7 +231,7 @@ fn every_recorded_run_is_replayed_to_the_bit() {
 
 #[test]
 fn resets_near_corners() {
-    for (name, crossings) in [("resets-1.mcap", 6), ("resets-2.mcap", 1), ("resets-3.mcap", 10)] {
+    for (name, crossings) in [("resets-1.mcap", 7), ("resets-2.mcap", 7), ("resets-3.mcap", 10)] {
         replayed(name, crossings);
         assert_eq!(Recorded::read(name).0.len(), 10, "{name}");
     }

@@ -225,13 +225,14 @@ impl Estimator {
     }
 
     /// A wheel at rest under preload: the baseline follows its wall. Whether compression and
-    /// preload contradict each other there; `begin` starts the comparison again.
+    /// preload contradict each other there; `begin` starts the comparison again, of a wheel that has
+    /// rested for these ticks, or for long.
     pub fn rest(
         &self,
         state: &mut EstimateState,
         sensed: &SensedState,
         arm_thrust: Newtons,
-        begin: bool,
+        begin: Option<Option<u32>>,
     ) -> bool {
         let seen = self.watch_input(state, sensed);
         self.watch.rest(&mut state.watch, &seen);
@@ -242,9 +243,10 @@ impl Estimator {
         } else {
             state.on_corner()
         };
-        if begin || on_edge {
+        if begin.is_some() || on_edge {
             let (travel, _) = state.turns(sensed);
-            self.tread.begin(&mut state.tread, travel, preload, compression);
+            let rested = begin.unwrap_or(Some(0));
+            self.tread.begin(&mut state.tread, (travel, rested), preload, compression);
             return false;
         }
         self.tread.rest(&mut state.tread, preload, arm_thrust, compression)

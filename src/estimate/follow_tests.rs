@@ -158,7 +158,9 @@ fn a_tread_is_compared_on_a_wall_alone() {
         state.position = Q16::from_num(position);
         state.watch.contact = contact;
         let estimator = estimator();
-        let report = |tick: &i32| estimator.rest(&mut state, &strange, Q16::ZERO, *tick <= 1);
+        let report = |tick: &i32| {
+            estimator.rest(&mut state, &strange, Q16::ZERO, (*tick <= 1).then_some(None))
+        };
         (1..500).filter(report).count()
     };
     assert_eq!(reported(Contact::Wall, Position::Located, 0.0), 1);

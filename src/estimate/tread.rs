@@ -76,6 +76,8 @@ pub struct Tread {
     rolling: (Millimetres, Millimetres),
     /// Least preload at which it is compared, N.
     least: Newtons,
+    /// Ticks in which a loaded tread gives way but for 2 %.
+    relaxes: u32,
     /// Force of the drive at full duty, N, its friction, and one sigma of the load that it shows.
     stall: Newtons,
     gearbox: Newtons,
@@ -95,6 +97,8 @@ pub struct TreadState {
     off: u16,
     /// The preload rose from below the least one since the wheel came to rest.
     pub(super) rises: bool,
+    /// The tread had relaxed by then.
+    relaxed: bool,
     /// Where the wheel was at rest.
     from: Travel,
     rest: Sums,
@@ -223,6 +227,8 @@ impl Tread {
             rolling: (length(from)?, length(to)?),
             least: checked("preload.cruise_n", LEAST_PART * rig.preload.cruise_n)?,
             stall: checked("drive.stall_force_n", rig.drive.stall_force_n)?,
+            // Under a constant load it gives way with `s tau`: four of these.
+            relaxes: (4e3 * rig.tread.stiffening * rig.tread.tau_s) as u32,
             gearbox: checked("drive.stall_force_n", GEARBOX * rig.drive.stall_force_n)?,
             load_sigma: checked("drive.stall_force_n", LOAD_SIGMA * rig.drive.stall_force_n)?,
             per_speed: checked("drive.no_load_speed_mm_s", 1.0 / rig.drive.no_load_speed_mm_s)?,
@@ -245,15 +251,17 @@ impl Tread {
         sqrt(depth) * depth * self.relaxed
     }
 
-    /// The wheel is at rest here and has been pressed like this for long.
+    /// The wheel is at rest here, and has been for these ticks or for long.
     pub fn begin(
         &self,
         state: &mut TreadState,
-        travel: Travel,
+        (travel, rested): (Travel, Option<u32>),
         preload: Newtons,
         compression: Millimetres,
     ) {
-        *state = TreadState { from: travel, rises: preload < self.least, ..TreadState::default() };
+        let relaxed = rested.is_none_or(|ticks| ticks >= self.relaxes);
+        let rises = preload < self.least;
+        *state = TreadState { from: travel, rises, relaxed, ..TreadState::default() };
         for (index, q) in state.q.iter_mut().enumerate() {
             *q = LowPassState::at(self.depth(index, Q16::ZERO, compression));
         }
@@ -297,7 +305,8 @@ impl Tread {
         if !state.rises {
             // A wheel that stood under its preload before a first drop shows its tread at rest.
             let rest = core::mem::take(&mut state.rest);
-            let seen = tick.direction == Direction::Retract && rest.ticks > OFF_TICKS;
+            let back = tick.direction == Direction::Retract && state.relaxed;
+            let seen = back && rest.ticks > OFF_TICKS;
             let (rest, pressed) = (rest.ratio(), tick.pressed);
             let other = (rest - Ratio::ONE).abs() > KNOWN_SCALE - Ratio::ONE;
             let load_sigma = self.load_sigma;

@@ -17,7 +17,7 @@ fn rolling(direction: Direction, travel: Travel, pressed: Q16, compression: Q16)
 /// A state that began with the wheel unloaded.
 fn begun(tread: &Tread) -> TreadState {
     let mut state = TreadState::default();
-    tread.begin(&mut state, Travel::ZERO, Q16::ZERO, Q16::ZERO);
+    tread.begin(&mut state, (Travel::ZERO, None), Q16::ZERO, Q16::ZERO);
     state
 }
 
@@ -171,18 +171,18 @@ fn a_load_that_presses_the_wheel_shows_in_the_tread() {
 }
 
 #[test]
-fn a_wheel_that_was_pressed_before_shows_no_ratio() {
+fn a_wheel_that_was_pressed_before_shows_its_relaxed_tread_on_the_way_back() {
     let tread = Tread::try_build(&Rig::prototype()).expect("in range");
-    let mut state = TreadState::default();
-    let (load, compression) = (q16(30_000_000), q16(300_000));
-    tread.begin(&mut state, Travel::ZERO, load, compression);
-    for _ in 0..1000 {
-        tread.rest(&mut state, load, Q16::ZERO, compression);
-    }
-    for tick in 0..1000 {
-        let travel = Travel::from_num(0.01 * f64::from(tick));
-        let rolls = rolling(Direction::Deploy, travel, load, compression);
-        assert_eq!(tread.roll(&mut state, &rolls), None);
+    let (thrust, compression) = (q16(6_000_000), q16(370_000));
+    let (out, back) = (Direction::Deploy, Direction::Retract);
+    let shown = [(out, None, 1.2, false), (back, Some(1000), 1.2, false), (back, None, 1.2, true)];
+    for (direction, rested, stiff, shows) in shown.into_iter().chain([(back, None, 1.0, false)]) {
+        let mut state = TreadState::default();
+        let preload = tread.means(compression) * Q16::from_num(stiff) - thrust;
+        tread.begin(&mut state, (Travel::ZERO, rested), preload, compression);
+        (0..100).for_each(|_| _ = tread.rest(&mut state, preload, thrust, compression));
+        let rolls = rolling(direction, Travel::ZERO, preload + thrust, compression);
+        assert_eq!(tread.roll(&mut state, &rolls).is_some(), shows, "{rested:?} {stiff}");
     }
 }
 
@@ -211,7 +211,7 @@ fn what_the_arm_may_add_excuses_as_much() {
     let relaxed = |arm_thrust: f64, compression: f64| {
         let mut state = TreadState::default();
         let (preload, compression) = (q16(40_000_000), Q16::from_num(compression));
-        tread.begin(&mut state, Travel::ZERO, preload, compression);
+        tread.begin(&mut state, (Travel::ZERO, None), preload, compression);
         (0..1000).any(|_| tread.rest(&mut state, preload, Q16::from_num(arm_thrust), compression))
     };
     let at = |force: f64| (force / stiffness(&rig)).powf(2.0 / 3.0);
@@ -236,7 +236,7 @@ proptest! {
         let tread = Tread::try_build(&rig).expect("in range");
         let mut state = TreadState::default();
         let shown = Q16::from_num(compression);
-        tread.begin(&mut state, Travel::ZERO, Q16::ZERO, shown);
+        tread.begin(&mut state, (Travel::ZERO, None), Q16::ZERO, shown);
         let load = tread.load(&mut state, Q16::ZERO, shown).0.to_num::<f64>();
         let exact = stiffness(&rig) * compression.powf(1.5);
         prop_assert!((load / exact - 1.0).abs() < 0.04, "{load} {exact}");
@@ -289,7 +289,7 @@ fn it_is_compared_from_the_least_preload_on_and_after_its_ticks() {
     let tread = Tread::try_build(&rig).expect("in range");
     let reported = |preload: Newtons| {
         let mut state = TreadState::default();
-        tread.begin(&mut state, Travel::ZERO, preload, Q16::ZERO);
+        tread.begin(&mut state, (Travel::ZERO, None), preload, Q16::ZERO);
         (1..2000).find(|_| tread.rest(&mut state, preload, Q16::ZERO, Q16::ZERO))
     };
     let least = Q16::from_num(LEAST_PART * rig.preload.cruise_n);

@@ -39,7 +39,12 @@ impl Controller {
             }
             if mode != state.mode {
                 let before = core::mem::replace(&mut state.mode, mode);
-                state.in_mode = 0;
+                let ticks = core::mem::take(&mut state.in_mode);
+                state.rested = if before.is_at_rest() {
+                    state.rested.map(|rested| rested.saturating_add(ticks))
+                } else {
+                    Some(0)
+                };
                 state.condition_ticks = 0;
                 tick.log(Event::Mode(mode));
                 self.enter(state, tick, before);
@@ -122,6 +127,7 @@ impl Controller {
 
     fn await_preload(&self, state: &mut State, tick: &mut Pass<'_>, direction: Direction) {
         let begin = state.in_mode <= 1;
+        let begin = begin.then_some(state.rested);
         if self.estimator.rest(&mut state.estimate, tick.sensed, tick.arm_thrust, begin) {
             tick.log(Event::Limit(Limit::CompressionStrange));
         }

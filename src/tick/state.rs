@@ -27,6 +27,8 @@ pub struct State {
     pub(super) mode: Mode,
     /// Ticks since the mode was entered.
     pub(super) in_mode: u32,
+    /// Ticks for which the drive has been at rest; none if that is as long as is known.
+    pub(super) rested: Option<u32>,
     /// Ticks for which the condition that the mode waits for has held.
     pub(super) condition_ticks: u32,
     pub(super) senses: SensesState,
@@ -91,6 +93,7 @@ impl State {
         Self {
             estimate: EstimateState::restored(record),
             senses: SensesState::with(record.map(|place| place.zeros).unwrap_or_default()),
+            rested: record.and(Some(0)),
             ..Self::default()
         }
     }

@@ -24,9 +24,10 @@ const RELEASES: [Millimetres; 3] = [q16(50_000), q16(-200_000), q16(300_000)];
 const GOLDEN: Ratio = q16(618_034);
 /// A gap this near its target serves to compare, as a part.
 const NEAR: Ratio = q16(5_000);
-/// Strides of a search, after which it takes the best that it has: 0.23 s of 22,000 textbook cycles
-/// each, 0.34 s with the waits of flash and beside the tick.
-const MOST_STRIDES: u32 = 1800;
+/// Strides of a search, at rest and under way, after which it compares no more and solves for the
+/// best that it has, in at most 800 more: 22,000 textbook cycles each, with the waits of flash and
+/// beside the tick 1.4 times that.
+const MOST_STRIDES: [u32; 2] = [4500, 1600];
 /// Change of the slowest speed with the gap that is tried first, 1/s.
 const FIRST_SLOPE: Q16 = q16(30_000_000);
 /// What a course counts that opens too wide a gap at its slowest, s, times that gap over the target:
@@ -86,7 +87,7 @@ impl<'a, P: AsyncFnMut()> Search<'a, P> {
             searching: request.searching,
             guess: ceiling,
             per_gap: q16(-1_500_000),
-            strides: MOST_STRIDES,
+            strides: MOST_STRIDES[usize::from(request.speed > Q16::ZERO)],
         }
     }
 
@@ -213,7 +214,7 @@ impl<'a, P: AsyncFnMut()> Search<'a, P> {
                 (high, above) = (speed, Some(course));
             }
             let reached = least <= gap && gap <= greatest || high <= self.floor || low >= most;
-            if reached || self.strides == 0 {
+            if reached || self.strides == 0 && over > Q16::ZERO {
                 return last;
             }
             let next = if last[1].rolled.gap > Q16::ZERO && last[1].rolled.gap != gap {
