@@ -14,7 +14,7 @@ const WAIT_TICKS: u32 = 100;
 /// Slip on a corner that ends a run for want of friction, mm: twice what a measured one is off by.
 const SURE_SLIP: Millimetres = q16(1_000_000);
 /// Ticks within which the model task must answer: more than its longest search takes with the waits
-/// of flash, 1.1 s at rest and 0.5 s under way. One that hangs is found by its check-ins.
+/// of flash, 1.2 s at rest and 1.0 s under way. One that hangs is found by its check-ins.
 const ANSWER_TICKS: u32 = 1200;
 
 impl Controller {

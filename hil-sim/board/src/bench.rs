@@ -17,7 +17,7 @@ use hil_sim::plant::draw::PlantParameters;
 use hil_sim::plant::rig::{Drives, VirtualRig};
 use hil_sim::plant::sensors::{Codes, Sensors};
 use hil_sim::record::letter;
-use hil_sim::scenario::{Direction, Scenario};
+use hil_sim::scenario::Scenario;
 use hil_sim::session;
 use interstage::sense::raw::{EncoderCount, SensorId};
 

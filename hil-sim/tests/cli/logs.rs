@@ -107,7 +107,7 @@ fn a_log_with_resets_is_shown_start_by_start() {
     let starts = found["starts"].as_array().unwrap_or_else(|| panic!("{found}"));
     assert_eq!(starts.len(), 10);
     let crossings = |of: &Value| of["crossings"].as_array().expect("a list").clone();
-    assert_eq!(starts.iter().map(|start| crossings(start).len()).sum::<usize>(), 6);
+    assert_eq!(starts.iter().map(|start| crossings(start).len()).sum::<usize>(), 7);
     for start in starts {
         let end = number(start, "total_s");
         let mut before = 0.0;

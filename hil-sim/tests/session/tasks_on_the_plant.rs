@@ -18,7 +18,7 @@ use embassy_time::{Duration, Instant, MockDriver};
 use hil_sim::plant::ledger::Crossing;
 use hil_sim::plant::rig::{Drives, VirtualRig};
 use hil_sim::plant::sensors::{Codes, Sensors};
-use hil_sim::scenario::{Direction, Scenario};
+use hil_sim::scenario::Scenario;
 use hil_sim::session::{self, plant_at_start};
 use interstage::hal::{
     AnalogInput, AngleBus, CommandSource, Indicator, Journal, Light, Motors, Watchdog, WheelEncoder,

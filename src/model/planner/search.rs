@@ -25,9 +25,9 @@ const GOLDEN: Ratio = q16(618_034);
 /// A gap this near its target serves to compare, as a part.
 const NEAR: Ratio = q16(5_000);
 /// Strides of a search, at rest and under way, after which it compares no more and solves for the
-/// best that it has, in at most 800 more: 22,000 textbook cycles each, with the waits of flash and
+/// best that it has, in at most 1,400 more: 22,000 textbook cycles each, with the waits of flash and
 /// beside the tick 1.4 times that.
-const MOST_STRIDES: [u32; 2] = [4500, 1600];
+const MOST_STRIDES: [u32; 2] = [4500, 3200];
 /// Change of the slowest speed with the gap that is tried first, 1/s.
 const FIRST_SLOPE: Q16 = q16(30_000_000);
 /// What a course counts that opens too wide a gap at its slowest, s, times that gap over the target:
@@ -254,9 +254,6 @@ impl<'a, P: AsyncFnMut()> Search<'a, P> {
                 let slowed = |speed: MillimetresPerSecond| self.floor + (speed - self.floor) * part;
                 let (slowest, windows) = (slowed(fastest), [window, slowed(window)]);
                 for &window in &windows[..1 + usize::from(rising)] {
-                    if self.strides == 0 {
-                        return best;
-                    }
                     let slower = self.roll(window, release, slowest).await;
                     if self.cost(&slower) < self.cost(&best) {
                         best = slower;
