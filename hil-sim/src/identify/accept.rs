@@ -31,6 +31,8 @@ const RESIDUALS: [(&str, f64); 4] =
 enum Limit {
     /// Part of the stated value.
     Part(f64),
+    /// Part of the stated value, below it alone.
+    Below(f64),
     /// In the key's unit.
     Of(f64),
 }
@@ -45,14 +47,15 @@ const ARRIVES_MM: f64 = 0.5;
 
 /// By the start of the name. At its limit a tread's key changes the gap by 1 %, a height by 3 %, the
 /// load changes the friction needed by 3 % (`rig crossing` at 10 mm/s and 47.6 N). Friction: three
-/// sigma of what two logs show of it. Places: what the end of travel has. Dead time and lag: half a
+/// sigma of what two logs show of it, below; how much there is above what was used, creep hardly
+/// shows, and more of it costs no grip. Places: what the end of travel has. Dead time and lag: half a
 /// newton at full rate. Rate, spring and drive: chosen, so that a scale of the preload sensor 10 %
 /// off, which shows in all of them and in the tread, exceeds one at least.
 const LIMITS: [(&str, Limit); 12] = [
     ("tread.k_inf_pa_per_m", Limit::Part(0.06)),
     ("tread.stiffening", Limit::Part(0.08)),
     ("tread.tau_s", Limit::Part(0.2)),
-    ("plant.mu", Limit::Part(0.12)),
+    ("plant.mu", Limit::Below(0.12)),
     ("plant.top_load_n", Limit::Part(0.1)),
     (DRIVE, Limit::Part(0.04)),
     (PLACES, Limit::Of(ARRIVES_MM)),
@@ -80,7 +83,7 @@ pub struct Key {
     #[serde(flatten)]
     pub found: Parameter,
     pub stated: f64,
-    /// Largest difference.
+    /// Largest difference; of friction below what is stated.
     pub limit: f64,
     pub ok: bool,
 }
@@ -217,15 +220,19 @@ fn keys(found: &Identification, scenario: &Scenario, off: f64) -> Vec<Key> {
     let mut key = |of: &Parameter| {
         let (_, limit) = LIMITS.iter().find(|(name, _)| of.name.starts_with(name))?;
         let stated = place_of(&mut table, &of.name).map_or(Some(1.0), |value| value.as_float())?;
-        let limit = match limit {
-            Limit::Part(part) => part * stated.abs(),
-            Limit::Of(limit) => *limit,
+        let (limit, below) = match limit {
+            Limit::Part(part) => (part * stated.abs(), false),
+            Limit::Below(part) => (part * stated.abs(), true),
+            Limit::Of(limit) => (*limit, false),
         };
         // The drive's force is known by its tolerance, another key by an interval within its limit.
-        let within = of.high.zip(of.low).is_some_and(|(high, low)| high - low <= 2.0 * limit);
+        let within = of.high.zip(of.low).is_some_and(|(high, low)| {
+            if below { low >= stated - 2.0 * limit } else { high - low <= 2.0 * limit }
+        });
         let is_known = of.identified || within || of.name == DRIVE;
         let off = if of.name.starts_with(PLACES) { off } else { 0.0 };
-        let ok = is_known && (of.value - off - stated).abs() <= limit;
+        let apart = of.value - off - stated;
+        let ok = is_known && apart >= -limit && (below || apart <= limit);
         Some(Key { found: of.clone(), stated, limit, ok })
     };
     found.parameters.iter().filter_map(&mut key).collect()
