@@ -37,6 +37,24 @@ enum Limit {
     Of(f64),
 }
 
+impl Limit {
+    /// The limit in the key's unit, and whether a parameter keeps it that is to be `off` what is stated.
+    fn judge(&self, of: &Parameter, stated: f64, off: f64) -> (f64, bool) {
+        let (limit, below) = match self {
+            Self::Part(part) => (part * stated.abs(), false),
+            Self::Below(part) => (part * stated.abs(), true),
+            Self::Of(limit) => (*limit, false),
+        };
+        // The drive's force is known by its tolerance, another key by an interval within its limit.
+        let within = of.high.zip(of.low).is_some_and(|(high, low)| {
+            if below { low >= stated - 2.0 * limit } else { high - low <= 2.0 * limit }
+        });
+        let is_known = of.identified || within || of.name == DRIVE;
+        let apart = of.value - off - stated;
+        (limit, is_known && apart >= -limit && (below || apart <= limit))
+    }
+}
+
 /// Name of what is told over nominal.
 const DRIVE: &str = "drive force over nominal";
 
@@ -220,19 +238,8 @@ fn keys(found: &Identification, scenario: &Scenario, off: f64) -> Vec<Key> {
     let mut key = |of: &Parameter| {
         let (_, limit) = LIMITS.iter().find(|(name, _)| of.name.starts_with(name))?;
         let stated = place_of(&mut table, &of.name).map_or(Some(1.0), |value| value.as_float())?;
-        let (limit, below) = match limit {
-            Limit::Part(part) => (part * stated.abs(), false),
-            Limit::Below(part) => (part * stated.abs(), true),
-            Limit::Of(limit) => (*limit, false),
-        };
-        // The drive's force is known by its tolerance, another key by an interval within its limit.
-        let within = of.high.zip(of.low).is_some_and(|(high, low)| {
-            if below { low >= stated - 2.0 * limit } else { high - low <= 2.0 * limit }
-        });
-        let is_known = of.identified || within || of.name == DRIVE;
         let off = if of.name.starts_with(PLACES) { off } else { 0.0 };
-        let apart = of.value - off - stated;
-        let ok = is_known && apart >= -limit && (below || apart <= limit);
+        let (limit, ok) = limit.judge(of, stated, off);
         Some(Key { found: of.clone(), stated, limit, ok })
     };
     found.parameters.iter().filter_map(&mut key).collect()
@@ -285,6 +292,28 @@ fn gaps(records: &[Record], runs: &[Summary], fit: &Fit, readings: &[(usize, f64
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_parameter_is_refused_off_its_limit_and_friction_below_it_alone() {
+        let of = |limit: &Limit, value: f64, half: f64, identified: bool| {
+            let (name, low, high) = (String::new(), Some(value - half), Some(value + half));
+            let found =
+                Parameter { name, unit: "", value, low, high, identified, by: String::new() };
+            limit.judge(&found, 1.0, 0.0).1
+        };
+        for (value, part, below) in
+            [(0.85, false, false), (0.9, true, true), (1.1, true, true), (1.3, false, true)]
+        {
+            let limits = [Limit::Part(0.12), Limit::Of(0.12), Limit::Below(0.12)];
+            let ok = limits.map(|limit| of(&limit, value, 0.1, true));
+            assert_eq!(ok, [part, part, below], "{value}");
+        }
+        // One that the logs do not show says nothing.
+        assert!(
+            !of(&Limit::Part(0.12), 1.0, 0.2, false) && of(&Limit::Part(0.12), 1.0, 0.1, false)
+        );
+        assert!(!of(&Limit::Below(0.12), 1.0, 0.3, false));
+    }
 
     #[test]
     fn a_start_explains_what_all_steps_are_off_and_no_more_than_a_run_arrives_off() {
