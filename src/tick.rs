@@ -22,7 +22,7 @@ use crate::sense::raw::SensorFrame;
 use crate::sense::{SensedState, Senses};
 use crate::supervise::{Command, Mode, Monitor, Observed, ServiceDuties, Trigger, next};
 use crate::units::{
-    Millimetres, MillimetresPerSecond, MotorCommand, Newtons, Q16, Ratio, Seconds, Tick,
+    Direction, Millimetres, MillimetresPerSecond, MotorCommand, Newtons, Q16, Ratio, Seconds, Tick,
 };
 
 pub use event::{CrossingRecord, Entry, Event};
@@ -191,7 +191,9 @@ impl Controller {
     }
 
     fn look_for_faults(&self, state: &mut State, tick: &mut Pass<'_>, input: &Input) {
-        let steady = state.profile.acceleration() == Q16::ZERO && !state.estimate.on_corner();
+        // A corner's force is fed forward on the way out alone.
+        let unknown = state.estimate.on_corner() && state.estimate.direction == Direction::Retract;
+        let steady = state.profile.acceleration() == Q16::ZERO && !unknown;
         let observed = Observed {
             now: tick.now,
             mode: state.mode,
@@ -201,7 +203,7 @@ impl Controller {
             bridges: input.sensors.bridges,
             speed_ref: state.outwards(state.profile.speed()),
             preload_due: state.preload_loop.due(),
-            effort: steady.then(|| state.speed_loop.value()),
+            effort: steady.then(|| state.speed_loop.effort()),
             overrun: input.overrun,
             emergency_stop: input.emergency_stop,
         };

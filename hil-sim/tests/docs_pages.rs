@@ -224,9 +224,9 @@ fn the_results_are_those_of_the_figures() {
     let rows = faults["matrix"].as_array().expect("rows");
     let count = |key: &str| rows.iter().map(|row| row[key].as_u64().expect("a count")).sum::<u64>();
     let counts = ["otherwise", "tolerated", "undetected", "unsafe"].map(count);
-    assert_eq!((count("found") + count("limited"), counts), (6195, [595, 1110, 0, 6]));
-    assert!(readme.contains("6,195 are reported by name, 595 as another fault and 1,110 not at"));
-    assert!(safety.contains("| 79 | 7,900 | 6,195 | 595 | 1,110 | 0 | 6 |"));
+    assert_eq!((count("found") + count("limited"), counts), (6197, [595, 1108, 0, 0]));
+    assert!(readme.contains("6,197 are reported by name, 595 as another fault and 1,108 not at"));
+    assert!(safety.contains("| 79 | 7,900 | 6,197 | 595 | 1,108 | 0 | 0 |"));
 }
 
 /// The figure behind a word of a printed summary.

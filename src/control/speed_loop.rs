@@ -29,10 +29,11 @@ pub struct SpeedLoop {
     integral: Q16,
 }
 
-/// The integral part, duty, Q31.32, and the last duty.
+/// The integral part, duty, Q31.32, what a corner adds to the feed-forward, and the last duty.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SpeedLoopState {
     integral: Travel,
+    corner: Ratio,
     duty: Ratio,
 }
 
@@ -49,7 +50,7 @@ impl SpeedLoop {
         })
     }
 
-    /// Of a load this part is fed forward from now on. The integral part yields as much, but for
+    /// Of a corner's load this part is fed forward from now on. The integral part yields as much, but for
     /// what the wheel still lacks by its error, mm/s: it has carried the load so far.
     pub fn hand_over(
         &self,
@@ -59,6 +60,7 @@ impl SpeedLoop {
         error: MillimetresPerSecond,
     ) {
         let whole = self.forward(load);
+        state.corner = whole;
         let lacks = error * self.per_speed * LAGS;
         let lacks = between(lacks, whole.min(Q16::ZERO), whole.max(Q16::ZERO));
         let limit = INTEGRAL_LIMIT.widen();
@@ -106,6 +108,12 @@ impl SpeedLoopState {
     pub fn value(&self) -> Ratio {
         Q16::narrow(self.integral)
     }
+
+    /// What of that a corner does not explain, whose force is known to a half.
+    pub fn effort(&self) -> Ratio {
+        let (value, part) = (self.value(), self.corner.abs().half());
+        between(Q16::ZERO, value - part, value + part)
+    }
 }
 
 #[cfg(test)]
@@ -147,17 +155,14 @@ mod tests {
         }
         assert!(state.value() <= INTEGRAL_LIMIT);
         // Released, it comes back within a fraction of a second.
-        let mut ticks = 0;
-        while control.step(&mut state, Q16::from_num(10), Q16::from_num(30), Q16::ZERO).to_bits()
-            > 0
-        {
-            ticks += 1;
-            assert!(ticks < 200);
-        }
+        let (wanted, measured) = (Q16::from_num(10), Q16::from_num(30));
+        let mut falls = || control.step(&mut state, wanted, measured, Q16::ZERO);
+        assert!((0..200).any(|_| falls().to_bits() <= 0));
     }
 
-    /// What handing a load over changes of the duty at this error, and the duty of the load.
-    fn handed(load: f64, error: f64) -> (f64, f64) {
+    /// What handing a load over changes of the duty at this error, the duty of the load, and the effort
+    /// that it leaves.
+    fn handed(load: f64, error: f64) -> [f64; 3] {
         let control = SpeedLoop::try_build(&Rig::prototype()).unwrap();
         let mut state = SpeedLoopState::default();
         for _ in 0..32 {
@@ -165,18 +170,19 @@ mod tests {
             control.hand_over(&mut state, load, q16(31_250), error);
         }
         let forward: f64 = control.forward(Q16::from_num(load)).to_num();
-        (forward + state.value().to_num::<f64>(), forward)
+        [forward + state.value().to_num::<f64>(), forward, state.effort().to_num()]
     }
 
     #[test]
     fn what_the_integral_carried_is_taken_from_it() {
         for load in [12.0, -12.0] {
-            assert!(handed(load, 0.0).0.abs() < 1e-3, "{:?}", handed(load, 0.0));
+            let [change, forward, effort] = handed(load, 0.0);
+            assert!(change.abs() < 1e-3 && (effort + 0.5 * forward).abs() < 1e-3, "{effort}");
             // A wheel that does not lag gets nothing, one that stands all of it.
-            assert!(handed(load, -load.signum()).0.abs() < 1e-3);
-            let (change, forward) = handed(load, 50.0 * load.signum());
-            assert!((change - forward).abs() < 1e-3 && forward.abs() > 0.07);
-            let (change, _) = handed(load, 0.6 * load.signum());
+            assert!(handed(load, -load.signum())[0].abs() < 1e-3);
+            let [change, forward, effort] = handed(load, 50.0 * load.signum());
+            assert!((change - forward).abs() < 1e-3 && forward.abs() > 0.07 && effort == 0.0);
+            let [change, ..] = handed(load, 0.6 * load.signum());
             assert!((change.abs() - 0.025).abs() < 1e-3, "{change}");
         }
     }

@@ -73,8 +73,8 @@ pub struct Observed<'a> {
     pub speed_ref: MillimetresPerSecond,
     /// Preload that the actuator should have reached by now, N.
     pub preload_due: Newtons,
-    /// Duty that the speed loop adds to its feed-forward, if the reference is steady and
-    /// the wheel on the continuous wall.
+    /// Duty that the speed loop adds to its feed-forward beyond what a corner explains, if the
+    /// reference is steady.
     pub effort: Option<Ratio>,
     /// The tick came more than a period late.
     pub overrun: bool,

@@ -53,6 +53,12 @@ fn urgent_faults_are_found_at_once_and_a_silent_sensor_within_its_age() {
 }
 
 #[test]
+fn an_encoder_that_reads_too_little_is_found_on_a_corner_as_well() {
+    let outcome = campaign(if long() { 200 } else { 40 }, |name| name == "encoder gain");
+    assert_eq!((outcome.undetected, outcome.unheld), (0, 0), "{outcome:#?}");
+}
+
+#[test]
 fn a_bridge_that_regulates_its_current_is_no_fault_of_the_bridge() {
     let outcome = campaign(if long() { 200 } else { 40 }, |name| name.ends_with("regulating"));
     assert_eq!((outcome.undetected, outcome.unheld), (0, 0), "{outcome:#?}");
