@@ -72,13 +72,14 @@ impl Ticks {
         }
     }
 
-    /// Mean and most cycles.
+    /// Mean and most cycles. One tick in a thousand takes a plan together with what another run's,
+    /// whose model task has more of the core or less, does not.
     fn cost(&self) -> [f64; 2] {
-        let sum: u64 = self.cycles.iter().sum();
-        [
-            sum as f64 / self.cycles.len() as f64,
-            self.cycles.iter().copied().max().unwrap_or_default() as f64,
-        ]
+        let mut cycles = self.cycles.clone();
+        cycles.sort_unstable();
+        let (last, cut) = (cycles.len() - 1, cycles.len() / 1000);
+        let sum: u64 = cycles.iter().sum();
+        [sum as f64 / cycles.len() as f64, cycles[last - cut] as f64]
     }
 
     /// Deviation of the beginnings from an even beat, cycles, and from the earliest to the
@@ -134,8 +135,7 @@ fn deployment(reader: Reader) -> (u32, Ticks) {
 fn neither_telemetry_nor_its_reader_changes_when_the_tick_begins_or_what_it_takes() {
     /// What two runs may differ by, relative.
     const SAME: f64 = 0.02;
-    /// And the extremes of their beginnings but for one tick in a thousand, cycles: 1 us, a
-    /// thousandth of the period.
+    /// And the extremes of their beginnings, cycles: 1 us, a thousandth of the period.
     const EXTREMES: f64 = 170.0;
     let (arrived, read) = deployment(Reader::There);
     let off = |one: f64, other: f64| (one / other - 1.0).abs();
