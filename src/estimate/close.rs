@@ -1,7 +1,7 @@
 //! Closes a crossing: its step corrects the position, and it is reported for review.
 
 use super::landing::Landing;
-use super::{EstimateState, Estimator, Findings, OpenCrossing, Position, Slip};
+use super::{EstimateState, Estimator, Findings, LiftPoint, OpenCrossing, Position, Slip};
 use crate::fault::{Fault, Limit};
 use crate::numeric::{divide, sqrt};
 use crate::sense::SensedState;
@@ -11,7 +11,7 @@ use crate::units::{Direction, Millimetres, Q16, Ratio, q16};
 const HEIGHT_SEEN: Millimetres = q16(120_000);
 /// How much of what a misread compression moves the face by is off, once it is known right over the edge:
 /// at a lift-off it may be anything from none to twice of that part, evenly spread.
-const PART_SIGMA: Ratio = q16(577_000);
+const MISREAD_SIGMA: Ratio = q16(577_000);
 
 impl Estimator {
     /// Largest residual of a step that is where the table has it, mm: its tolerance, and what the
@@ -115,70 +115,9 @@ impl Estimator {
         let higher = measured.height - self.steps.height;
         state.raised += higher * Q16::from_num(state.direction.sign());
         let Some(mut open) = state.crossing else { return };
-        let retracts = state.direction == Direction::Retract;
         if let Some(mut point) = open.lift {
             if !open.resumed && !open.turned {
-                // How low the wall lies that takes a retracting wheel was not known at the lift.
-                // A slide may follow what looked like the end of one.
-                let known = open.landing.filter(|landing| landing.slid > Q16::ZERO);
-                let more = |last: &Landing| known.is_none_or(|known| last.slid > known.slid);
-                let landing = open.slide.landing().filter(more).inspect(|last| {
-                    let before = known.unwrap_or_default();
-                    open.slip.lost += last.slid - before.slid;
-                    open.landing = Some(*last);
-                    state.odometry.slip(last.lost - before.lost, Q16::ZERO);
-                    state.begin_tick(sensed.travel);
-                });
-                let landing = landing.or(known);
-                let shift = landing.map_or(measured.shift, |landing| landing.face - point.face);
-                // Retracting, it was over the edge where the table has that.
-                let elsewhere = retracts && (point.residual + shift).abs() > self.steps.tolerance;
-                let missed = missed(state, open.step, higher).filter(|_| !elsewhere);
-                let misread = point.leverage * missed.unwrap_or(Ratio::ZERO);
-                let shift = if retracts { shift } else { shift - misread };
-                if state.known.is_searching() && open.step > 0 {
-                    self.count_down(state, sensed, &mut open);
-                    found.advanced = true;
-                }
-                let left = match self.steps.face(open.step) {
-                    Some(table) if state.known.is_searching() => {
-                        let left = table - point.face;
-                        let position = state.position + left - shift;
-                        state.odometry.set_by_step(sensed.travel, position);
-                        state.known = Position::Located;
-                        (point.residual, open.corrected) = (-left, true);
-                        left
-                    }
-                    None => shift,
-                    Some(_) if open.corrected => state.odometry.refine(shift),
-                    Some(_) => {
-                        let residual = point.residual + shift;
-                        self.correct(state, sensed, (open.step, residual), found) - point.residual
-                    }
-                };
-                if missed.is_some() {
-                    let part = if retracts { Ratio::ONE } else { PART_SIGMA };
-                    state.odometry.misread(state.direction, misread.abs() * part);
-                }
-                if let Some(climb) = open.climb.filter(|climb| climb.leverage > Q16::ZERO) {
-                    let leverage = climb.leverage + point.leverage;
-                    let sigma = leverage * missed.unwrap_or(Ratio::ZERO).abs() * PART_SIGMA;
-                    let moved = climb.moved + higher * climb.slope - measured.shift;
-                    state.odometry.climb(state.position, &climb.since, moved, sigma);
-                }
-                if let Some(landing) = landing.filter(|landing| landing.slid > Q16::ZERO) {
-                    state.odometry.slip(Q16::ZERO, landing.sigma());
-                    if higher > HEIGHT_SEEN && open.slide.may_unwind(landing.slid) {
-                        open.slip.lost -= landing.slid;
-                    }
-                }
-                if higher.abs() > HEIGHT_SEEN {
-                    // The height moves the face, and is read on a wall that is not there.
-                    state.odometry.doubt(shift);
-                }
-                point.face += left;
-                point.residual += left;
-                state.begin_tick(sensed.travel);
+                self.relocate(state, sensed, measured, (&mut open, &mut point), found);
             }
             point.gap_as_table = measured.gap_as_table;
             open.lift = Some(point);
@@ -198,6 +137,81 @@ impl Estimator {
             found.closed = Some((open, measured.plausible));
             found.replan = true;
         }
+    }
+
+    /// The step of a crossing corrects the position: by where the wheel left it, by what the wall behind
+    /// shows of that, and by what of it is a sensor's or a slide's.
+    fn relocate(
+        &self,
+        state: &mut EstimateState,
+        sensed: &SensedState,
+        measured: &Measured,
+        (open, point): (&mut OpenCrossing, &mut LiftPoint),
+        found: &mut Findings,
+    ) {
+        let higher = measured.height - self.steps.height;
+        let retracts = state.direction == Direction::Retract;
+        // How low the wall lies that takes a retracting wheel was not known at the lift.
+        // A slide may follow what looked like the end of one.
+        let known = open.landing.filter(|landing| landing.slid > Q16::ZERO);
+        let more = |last: &Landing| known.is_none_or(|known| last.slid > known.slid);
+        let landing = open.slide.landing().filter(more).inspect(|last| {
+            let before = known.unwrap_or_default();
+            open.slip.lost += last.slid - before.slid;
+            open.landing = Some(*last);
+            state.odometry.slip(last.lost - before.lost, Q16::ZERO);
+            state.begin_tick(sensed.travel);
+        });
+        let landing = landing.or(known);
+        let shift = landing.map_or(measured.shift, |landing| landing.face - point.face);
+        // Retracting, it was over the edge where the table has that.
+        let elsewhere = retracts && (point.residual + shift).abs() > self.steps.tolerance;
+        let missed = missed(state, open.step, higher).filter(|_| !elsewhere);
+        let misread = point.leverage * missed.unwrap_or(Ratio::ZERO);
+        let shift = if retracts { shift } else { shift - misread };
+        if state.known.is_searching() && open.step > 0 {
+            self.count_down(state, sensed, open);
+            found.advanced = true;
+        }
+        let left = match self.steps.face(open.step) {
+            Some(table) if state.known.is_searching() => {
+                let left = table - point.face;
+                let position = state.position + left - shift;
+                state.odometry.set_by_step(sensed.travel, position);
+                state.known = Position::Located;
+                (point.residual, open.corrected) = (-left, true);
+                left
+            }
+            None => shift,
+            Some(_) if open.corrected => state.odometry.refine(shift),
+            Some(_) => {
+                let residual = point.residual + shift;
+                self.correct(state, sensed, (open.step, residual), found) - point.residual
+            }
+        };
+        if missed.is_some() {
+            let part = if retracts { Ratio::ONE } else { MISREAD_SIGMA };
+            state.odometry.misread(state.direction, misread.abs() * part);
+        }
+        if let Some(climb) = open.climb.filter(|climb| climb.leverage > Q16::ZERO) {
+            let leverage = climb.leverage + point.leverage;
+            let sigma = leverage * missed.unwrap_or(Ratio::ZERO).abs() * MISREAD_SIGMA;
+            let moved = climb.moved + higher * climb.slope - measured.shift;
+            state.odometry.climb(state.position, &climb.since, moved, sigma);
+        }
+        if let Some(landing) = landing.filter(|landing| landing.slid > Q16::ZERO) {
+            state.odometry.slip(Q16::ZERO, landing.sigma());
+            if higher > HEIGHT_SEEN && open.slide.may_unwind(landing.slid) {
+                open.slip.lost -= landing.slid;
+            }
+        }
+        if higher.abs() > HEIGHT_SEEN {
+            // The height moves the face, and is read on a wall that is not there.
+            state.odometry.doubt(shift);
+        }
+        point.face += left;
+        point.residual += left;
+        state.begin_tick(sensed.travel);
     }
 
     /// A step found by a search on the way down is the one above the wall that the arm shows behind

@@ -31,7 +31,7 @@ const SHOWN: Millimetres = Q16::from_bits(3 * HEIGHT_MOST.to_bits());
 const MOST: Millimetres = q16(800_000);
 /// Part of a slip that is one sigma of it: what the reference lets pass 10 mm before the face, 0.27 of
 /// the travel and [`CREEPS`], evenly spread.
-const PART_SIGMA: Ratio = q16(200_000);
+const SLIP_SIGMA: Ratio = q16(200_000);
 
 /// Where a tick has the face.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -124,14 +124,14 @@ impl CornerSlip {
 
     /// One sigma of the slip so far, mm.
     pub fn sigma(&self) -> Millimetres {
-        self.noise + self.lost * PART_SIGMA
+        self.noise + self.lost * SLIP_SIGMA
     }
 
     /// One sigma that the last `lost` of it adds to the position, mm: what the parts of a slip are
     /// off by has one cause, so that in all it is [`Self::sigma`].
     pub(super) fn sigma_of(&self, lost: Millimetres) -> Millimetres {
         let now = self.sigma();
-        let before = if lost >= self.lost { Q16::ZERO } else { now - lost * PART_SIGMA };
+        let before = if lost >= self.lost { Q16::ZERO } else { now - lost * SLIP_SIGMA };
         sqrt((now - before) * (now + before))
     }
 }

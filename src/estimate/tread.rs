@@ -300,7 +300,7 @@ impl Tread {
     /// A tick of a wheel that rolls on a wall. Once, where enough has been seen, the tread at rest
     /// and rolling, and the load.
     /// None while the wheel is too close to where it was at rest, or too far away, or if its
-    /// preload did not rise there.
+    /// preload did not rise there and it did not stand before a first drop either.
     pub fn roll(&self, state: &mut TreadState, tick: &Rolls) -> Option<Shown> {
         if !state.rises {
             // A wheel that stood under its preload before a first drop shows its tread at rest.

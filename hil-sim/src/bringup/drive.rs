@@ -72,7 +72,7 @@ pub(super) fn drive(session: &mut Session<'_, '_>) -> Result<Vec<Check>, Bringup
     checks.push(check(
         "drive speed",
         near,
-        format!("{no_load:.1} mm/s at full duty, parameter {wanted:.1}"),
+        format!("{no_load:.1} mm/s at full duty, parameter {wanted:.1}{}", fault(&fast)),
         &format!(
             "the motor, its supply's voltage, sense.encoder_counts or rig.wheel_radius_mm is \
              another: one turn of the wheel by hand must give sense.encoder_counts. If that is \

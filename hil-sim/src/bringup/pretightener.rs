@@ -150,7 +150,8 @@ fn judge(session: &mut Session<'_, '_>, levels: &[(f64, Level)]) -> Vec<Check> {
     let [(t_1, first), (t_2, second), (t_3, last)] = levels else { return Vec::new() };
     let inwards = last.angle < 0.0;
     let advice = if inwards {
-        "the arm's codes grow inwards: turn the magnet over, then measure sense.angle_zero_code"
+        "the arm's codes grow inwards: put the chip at the pivot's other end, then measure \
+         sense.angle_zero_code"
     } else {
         "the arm's code does not follow the tread's compression: the magnet turns with the arm, \
          and the sensor does not?"

@@ -202,7 +202,7 @@ fn arm(session: &mut Session<'_, '_>, rows: &[Record]) -> Vec<Check> {
     let advice = format!(
         "the angle's zero code is far off, or the arm is not at the stow end, or its codes grow \
          inwards. Bring it to the stow end, then move it outwards by hand: if the code grows, set \
-         sense.angle_zero_code = {zero:.0}; if it falls, turn the magnet over"
+         sense.angle_zero_code = {zero:.0}; if it falls, put the chip at the pivot's other end"
     );
     if near {
         session.proposed.rig.sense.angle_zero_code = zero;

@@ -32,7 +32,7 @@ impl Fit {
     /// Of a log, a coordinate. One that settles nothing alone contradicts nothing.
     fn shift(&self, records: &[Record], log: usize) -> f64 {
         let (run, at) = (&self.runs[log..=log], &self.contact.trajectories[log..=log]);
-        let own = contact::refit(run, &self.coordinates, (&self.contact.x, at), &[]).ok();
+        let own = contact::refit(run, &self.coordinates, (&self.contact.x, at)).ok();
         let common = &self.contact.residuals[log];
         let contact = own.map(|own| moved(&own.residuals[0], common, &contact::LEAST, own.x.len()));
         let own = actuator::fit(&records[log..=log], run, at, self.contact.x[RADIUS]).ok();

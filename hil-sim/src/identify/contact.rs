@@ -133,43 +133,28 @@ impl Model for Weighted<'_> {
     }
 }
 
-/// Fits the coordinates to the runs, then twice more with the noise that this leaves.
+/// Fits the coordinates to the runs: coarsely, twice more with the noise that this leaves, and finely.
 pub(crate) fn fit(runs: &[Run], coordinates: &Coordinates) -> Result<Contact, IdentifyError> {
-    let start: Vec<f64> = coordinates.priors().iter().map(|prior| prior.mean).collect();
+    let coarse = coordinates.coarse();
+    let start: Vec<f64> = coarse.priors().iter().map(|prior| prior.mean).collect();
     // Friction shows in the creep, and only once the rest is in place.
-    let held = coordinates.known(FRICTION, start[FRICTION], HELD_LN);
-    let mut model = Weighted::new(runs, &held);
-    let first = minimise(&model, &start, NEAR)?;
-    model.coordinates = coordinates;
-    refine(model, (&first.x, &first.at), &[])
+    let held = coarse.known(FRICTION, start[FRICTION], HELD_LN);
+    let first = minimise(&Weighted::new(runs, &held), &start, NEAR)?;
+    let near = refit(runs, &coarse, (&first.x, &first.at))?;
+    refit(runs, coordinates, (&near.x, &near.trajectories))
 }
 
-/// The twice more from near the fit on, a point and the trajectories there; the last time from these
-/// offsets of friction, too, which has small minima.
+/// Twice from near the fit on, a point and the trajectories there, with the noise that is left.
 pub(super) fn refit(
     runs: &[Run],
     coordinates: &Coordinates,
-    near: (&[f64], &[Trajectory]),
-    offsets_ln: &[f64],
-) -> Result<Contact, IdentifyError> {
-    refine(Weighted::new(runs, coordinates), near, offsets_ln)
-}
-
-fn refine(
-    mut model: Weighted<'_>,
     (x, at): (&[f64], &[Trajectory]),
-    offsets_ln: &[f64],
 ) -> Result<Contact, IdentifyError> {
+    let mut model = Weighted::new(runs, coordinates);
     model.reweigh(x, at);
     let second = minimise(&model, x, NEAR)?;
     model.reweigh(&second.x, &second.at);
-    let mut fitted = minimise(&model, &second.x, SETTLED)?;
-    for off in offsets_ln {
-        let mut from = second.x.clone();
-        from[FRICTION] += off;
-        let (left, other) = (fitted.residuals.norm(), minimise(&model, &from, SETTLED).ok());
-        fitted = other.filter(|other| other.residuals.norm() < left).unwrap_or(fitted);
-    }
+    let fitted = minimise(&model, &second.x, SETTLED)?;
     let blocks = model.blocks();
     let mut covariance = robust(&fitted.jacobian, &fitted.residuals, &blocks, WIDENED)?;
     // What the model is off by moves what the logs weigh against it along.
@@ -179,4 +164,23 @@ fn refine(
     }
     let residuals = model.remaining(&fitted.x, &fitted.at);
     Ok(Contact { covariance, trajectories: fitted.at, x: fitted.x, residuals })
+}
+
+/// By how much more these logs are off with the second of two frictions than with the first, in squares
+/// of deviations; all else is fitted to each, from `fitted` on.
+pub(super) fn prefers(
+    runs: &[Run],
+    coordinates: &Coordinates,
+    fitted: &Contact,
+    frictions: [f64; 2],
+) -> f64 {
+    let [first, second] = frictions.map(|mu| {
+        let held = coordinates.known(FRICTION, mu.ln(), HELD_LN);
+        let mut model = Weighted::new(runs, &held);
+        model.reweigh(&fitted.x, &fitted.trajectories);
+        let mut from = fitted.x.clone();
+        from[FRICTION] = mu.ln();
+        minimise(&model, &from, NEAR).map_or(f64::INFINITY, |of| of.residuals.norm_squared())
+    });
+    second - first
 }

@@ -53,6 +53,10 @@ pub(crate) const OFF: [(usize, f64); 4] =
 const COMPLIANCE_LN: f64 = 0.2;
 /// Deviation of where a run begins that an earlier one has ended, mm: a run arrives within 0.5.
 const START_MM: f64 = 0.25;
+/// Elements of the forward model's ring for one of the plant's. Elements meet a corner one by one, those
+/// of the log at places that no model knows: with as few of its own a fit follows both, and finds
+/// friction 3 % too low.
+const FINER: usize = 4;
 /// Deviation of a coordinate that is stated without tolerance.
 const EXACT: f64 = 1e-6;
 
@@ -221,7 +225,8 @@ impl Coordinates {
         // A log of the virtual rig holds what its controller was not told: it is not known here.
         exact.mismatch = Mismatch::default();
         exact.run.seed = 0;
-        let nominal = exact.plant();
+        let mut nominal = exact.plant();
+        nominal.ring.elements *= FINER;
         let steps = nominal.wall.steps().len();
         let spread = &scenario.spread;
         let mut priors: Vec<Prior> =
@@ -230,6 +235,13 @@ impl Coordinates {
         priors.extend(all.clone().map(|step| free(step.position_mm, UNKNOWN_POSITION_MM)));
         priors.extend(all.map(|step| free(step.height_mm, UNKNOWN_HEIGHT_MM)));
         Self { nominal, steps, priors }
+    }
+
+    /// The same with as few elements as the plant has: quick, for a fit that starts from afar.
+    pub(crate) fn coarse(&self) -> Self {
+        let mut coarse = self.clone();
+        coarse.nominal.ring.elements /= FINER;
+        coarse
     }
 
     /// What is known of each coordinate; their means are where the fit starts.

@@ -225,9 +225,9 @@ pub(crate) fn derivatives(
     x: &[f64],
     base: &Trajectory,
 ) -> Result<Vec<Channels>, PlantError> {
-    // Steps and starts by half an element, so that elements meet the corner alike on either side.
+    // Steps by half an element, so that elements meet the corner alike on either side.
     let by_mm = 0.5 * coordinates.nominal().ring.pitch_mm();
-    let places = coordinates.of_steps().chain(run.start).map(|index| (index, by_mm));
+    let places = coordinates.of_steps().map(|index| (index, by_mm));
     // Friction by half of what keeps the wheel from slipping at most.
     let room = 0.5 * (x[FRICTION].exp() / base.most_utilisation).ln();
     let moved = ROWS.iter().enumerate().filter_map(|(index, row)| match row.moves {
@@ -248,7 +248,7 @@ pub(crate) fn derivatives(
     };
     let changes: Vec<Trajectory> =
         moves.par_iter().map(difference).collect::<Result<_, PlantError>>()?;
-    let predicted = run.predicted(base, x);
+    let (predicted, scale) = (run.predicted(base, x), coordinates.scale(x));
     // By a small part of the change: the geometry of the arm is not linear.
     let by_change = |change: &Trajectory| {
         const PART: f64 = 1e-3;
@@ -263,6 +263,13 @@ pub(crate) fn derivatives(
     let mut columns = vec![quotient(&predicted, &predicted, 1.0); x.len()];
     for (&(index, _), change) in moves.iter().zip(&changes) {
         columns[index] = by_change(change);
+    }
+    // From farther on all steps are nearer.
+    if let Some(start) = run.start {
+        for step in 0..coordinates.steps() {
+            let nearer = &columns[coordinates.position(step)];
+            columns[start] = combined(&columns[start], nearer, |sum, by| sum - by / scale);
+        }
     }
     // The drive's effort depends on the radius, too.
     columns[RADIUS] = combined(&columns[RADIUS], &by_sensors(RADIUS, 1e-3), |a, b| a + b);

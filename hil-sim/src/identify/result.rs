@@ -134,16 +134,15 @@ pub(super) struct Fit {
 
 /// Identifies the rig of `scenario` from its logs.
 pub fn identify(records: &[Record], scenario: &Scenario) -> Result<Identification, IdentifyError> {
-    let (found, fit) = fitted(records, scenario, None)?;
+    let (found, fit) = fitted(records, scenario)?;
     fit.agree(records)?;
     Ok(found)
 }
 
-/// The same with the fit; from one on and from these offsets of its friction, too.
+/// The same with the fit.
 pub(super) fn fitted(
     records: &[Record],
     scenario: &Scenario,
-    near: Option<(&Contact, &[f64])>,
 ) -> Result<(Identification, Fit), IdentifyError> {
     for record in records {
         let (its, ours) = (&record.scenario.rig, &scenario.rig);
@@ -156,12 +155,7 @@ pub(super) fn fitted(
     let mut coordinates = Coordinates::of(scenario);
     let run = |record| Run::of(record, &mut coordinates);
     let runs: Vec<Run> = records.iter().map(run).collect::<Result<_, _>>()?;
-    let contact = match near {
-        None => contact::fit(&runs, &coordinates)?,
-        Some((Contact { x, trajectories, .. }, offsets_ln)) => {
-            contact::refit(&runs, &coordinates, (x, trajectories), offsets_ln)?
-        }
-    };
+    let contact = contact::fit(&runs, &coordinates)?;
     let actuator = actuator::fit(records, &runs, &contact.trajectories, contact.x[RADIUS])?;
     let lost = actuator.x[actuator::LOST];
     let report =
