@@ -91,19 +91,19 @@ gates! {
         "compression sensor" | "reads it unloaded" | "0 mm, 0.1 mm at most"
         "compression noise" | "reads it for 0.5 s" | "0.008 mm at most, one sigma"
         "angle sensor" | "reads its frames" | "sound frames, field in range"
-        "angle zero" | "compares it with the stow end" | "within 40 codes"
+        "angle zero" | "compares it with the stow end" | "within 40 codes; a new magnet's is named"
         "preload lead" | "you unplug the sensor" | "below 2 % of the converter"
         "compression lead" | "you unplug the sensor" | "below 2 % of the converter"
         "self-test" | "resets the controller" | "idle, zeros taken";
     Stop "emergency stop", Some(stop::run) =>
         "stop pressed" | "you press the emergency stop" | "fault 151"
-        "stop cuts supply" | "you look at the supply" | "the motors have no supply"
+        "stop cuts supply" | "you measure at the bridges" | "below 3 V within 5 s"
         "held in reset" | "you hold the board's reset button" | "nothing moves";
     /// The drive, wheel free.
     Drive "drive", Some(drive::drive) =>
         "drive bridge" | "15 % for 0.6 s, readback" | "15 %, the other bridge 0"
         "drive turns" | "15 % outwards, the encoder" | "counts upwards"
-        "drive direction" | "you look at the wheel" | "it turns outwards"
+        "drive direction" | "you look at the wheel" | "its wall side goes to the stow end"
         "drive speed" | "15 % and 30 %" | "its parameter, within 25 %"
         "drive friction" | "the same" | "less than 8 % of duty";
     Pretightener "pre-tightener", Some(pretightener::pretightener) =>

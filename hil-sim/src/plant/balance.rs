@@ -144,8 +144,12 @@ impl Balance {
         let contact = ring.trial(&motion);
         let lift = motion.height_mm - ring.parameters().radius_mm;
         let forces = (contact.cosine_n, contact.sine_n);
-        let (residual, slope, _) = self.residual(forces, contact.slope, lift);
+        let (residual, slope, utilisation) = self.residual(forces, contact.slope, lift);
         let scale = (self.preload_n + self.arm_n).max(1.0);
+        if contact.cosine_n == 0.0 && residual.abs() <= TOLERANCE * scale {
+            // It hangs on its spring.
+            return Ok(Solved { height_mm: motion.height_mm, contact, utilisation });
+        }
         if residual.abs() <= NEAR * scale && slope < 0.0 && contact.cosine_n > 0.0 {
             let change = -residual / slope;
             let contact = contact.moved(change);
@@ -279,6 +283,18 @@ mod tests {
             normal: 1.02,
             offset_n: 0.0,
         }
+    }
+
+    /// One that was pressed by a rounding more than its weight lifts fell onto the wall.
+    #[test]
+    fn a_wheel_that_hangs_on_its_spring_stays_there() {
+        let (mut ring, motion) = climbing();
+        let (preload_n, spring_n_per_mm, lift) = (-1.7, 1.2, 14.2);
+        let arm_n = 1e-13 - (preload_n + spring_n_per_mm * lift);
+        let balance = Balance { preload_n, spring_n_per_mm, arm_n, axial: Axial::Utilised(0.0) };
+        let height_mm = ring.parameters().radius_mm + lift;
+        let solved = balance.solve_near(&mut ring, Motion { height_mm, ..motion }).unwrap();
+        assert!((solved.height_mm - height_mm).abs() < 1e-9, "{solved:?}");
     }
 
     #[test]

@@ -95,6 +95,12 @@ fn logs_of_two_rigs_are_refused_and_the_odd_one_is_named() {
     let soft = judged(&[&log("soft", &["--set", "mismatch.tread_stiffness=0.85"])]);
     assert_eq!(soft["residuals"][0]["ok"], false, "{soft}");
     refused_in(at, &["accept", &back, "--gap", "7=2.6"], &["--gap: step 7"]);
+    // How far off a run began that begins pressed, no step shows: 0.25 mm, one sigma.
+    let of_back = object(&rig_in(at, &["identify", "--json", &back]));
+    let mut all = of_back["parameters"].as_array().unwrap().iter();
+    let place = all.find(|of| of["name"] == "rig.step_positions_mm[2]").unwrap();
+    let [low, high] = ["low", "high"].map(|end| place[end].as_f64().unwrap());
+    assert!(high - low > 6.0 * 0.25 && low < 40.0 && 40.0 < high, "{place}");
 }
 
 #[test]
