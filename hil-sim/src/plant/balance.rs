@@ -289,12 +289,13 @@ mod tests {
     #[test]
     fn a_wheel_that_hangs_on_its_spring_stays_there() {
         let (mut ring, motion) = climbing();
-        let (preload_n, spring_n_per_mm, lift) = (-1.7, 1.2, 14.2);
-        let arm_n = 1e-13 - (preload_n + spring_n_per_mm * lift);
-        let balance = Balance { preload_n, spring_n_per_mm, arm_n, axial: Axial::Utilised(0.0) };
-        let height_mm = ring.parameters().radius_mm + lift;
+        let (preload_n, spring_n_per_mm, radius_mm) = (-1.7, 1.2, ring.parameters().radius_mm);
+        let height_mm = radius_mm + 14.2;
+        let spring_n: f64 = preload_n + spring_n_per_mm * (height_mm - radius_mm);
+        let (arm_n, axial) = (-spring_n.next_down(), Axial::Utilised(0.0));
+        let balance = Balance { preload_n, spring_n_per_mm, arm_n, axial };
         let solved = balance.solve_near(&mut ring, Motion { height_mm, ..motion }).unwrap();
-        assert!((solved.height_mm - height_mm).abs() < 1e-9, "{solved:?}");
+        assert_eq!(solved.height_mm, height_mm);
     }
 
     #[test]
