@@ -212,8 +212,8 @@ fn commission(seed: u64, changes: &[Change]) -> [Vec<String>; 3] {
 }
 
 /// Of 20 rigs 19 are within the intervals with every key, none that has changed is accepted, and of the
-/// unchanged 15 are: two runs at one preload show friction no better than its limit of 12 %. The
-/// short run takes one, which says nothing of that.
+/// unchanged 15 are: some end at a gate, some are refused for friction. The short run takes one, which
+/// says nothing of that.
 #[test]
 fn unknown_rigs_are_commissioned_and_accepted() {
     let (first, rigs, changes) =

@@ -53,8 +53,8 @@ pub(crate) const OFF: [(usize, f64); 4] =
 const COMPLIANCE_LN: f64 = 0.2;
 /// Deviation of where a run begins that an earlier one has ended, mm: a run arrives within 0.5.
 const START_MM: f64 = 0.25;
-/// Elements of the forward model's ring for one of the plant's. Elements meet a corner one by one, those
-/// of the log at places that no model knows: with as few of its own a fit follows both, and finds
+/// Elements of the forward model's ring for one of the plant's. Elements meet a corner one by one. Those
+/// of a log do so at places that no model knows; a ring as coarse follows them, and its fit finds
 /// friction 3 % too low.
 const FINER: usize = 4;
 /// Deviation of a coordinate that is stated without tolerance.
