@@ -98,7 +98,7 @@ gates! {
     Stop "emergency stop", Some(stop::run) =>
         "stop pressed" | "you press the emergency stop" | "fault 151"
         "stop cuts supply" | "you measure at the bridges" | "below 3 V within 5 s"
-        "held in reset" | "you hold the board's reset button" | "nothing moves";
+        "held in reset" | "you hold the board's reset button" | "no voltage at the bridges' outputs";
     /// The drive, wheel free.
     Drive "drive", Some(drive::drive) =>
         "drive bridge" | "15 % for 0.6 s, readback" | "15 %, the other bridge 0"

@@ -89,7 +89,8 @@ impl<O: Operator> Operator for Person<'_, O> {
             Action::ReleaseStop => wiring.stop_pressed = false,
             Action::Unplug(sensor) => wiring.unplugged.push(sensor),
             Action::Plug(sensor) => wiring.unplugged.retain(|known| *known != sensor),
-            Action::LiftOff | Action::TakeOff(_) => bench.plant.lift(0.0, None),
+            Action::Block => bench.plant.block(),
+            Action::SetDown | Action::LiftOff | Action::TakeOff(_) => bench.plant.lift(0.0, None),
             Action::HoldReset => bench.hold_reset(RESET_MS).map_err(gone)?,
         }
         bench.connect();

@@ -40,7 +40,7 @@ pub enum Mistake {
     /// The angle encoder is not connected.
     AngleOpen,
     MagnetMissing,
-    /// Its magnet is turned over: the codes grow inwards from the right one at the stow end.
+    /// Its chip is at the pivot's other end: the codes grow inwards from the right one at the stow end.
     ArmInwards,
     /// The angle's zero code is far off.
     AngleZero,
@@ -247,7 +247,7 @@ impl Wiring {
         BridgeCodes { drive, pretightener }
     }
 
-    /// The angle's frame with the magnet turned over at the stow end, or the zero elsewhere.
+    /// The angle's frame, of a chip at the pivot's other end or with its zero elsewhere.
     fn arm(&self, frame: u16) -> u16 {
         let mut code = i32::from(frame & 0x3FFF);
         if self.has(Mistake::ArmInwards) {

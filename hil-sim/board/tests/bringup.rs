@@ -83,7 +83,8 @@ fn guided() -> impl Iterator<Item = &'static str> {
 
 #[test]
 fn what_the_gates_find_of_hidden_rigs_is_within_their_intervals() {
-    for seed in 1..=if long() { 20 } else { 2 } {
+    // The wheel of the first wedges where it is not held off.
+    for seed in [7_500_016].into_iter().chain(1..=if long() { 20 } else { 1 }) {
         let wide = include_str!("../../tests/identify/hidden.toml");
         let hidden = Scenario::parse("hidden", wide, &[format!("run.seed={seed}")]).expect("a rig");
         let found = power_up_over(&[], &hidden, |board| board);

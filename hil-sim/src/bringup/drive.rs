@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use super::figures::{Counted, Scale, counted, mean};
 use super::line::{Motion, drive as drive_by, press};
 use super::motion::{CHANGED, bridge, driven, fault};
-use super::{BringupError, Check, Question, Seen, Session, check};
+use super::{Action, BringupError, Check, Question, Seen, Session, check};
 use crate::table;
 
 /// Input data of port A, with the wheel encoder's lines.
@@ -14,14 +14,13 @@ const PORT_A: u32 = 0x4800_0010;
 const SLOW: f64 = 0.15;
 const FAST: f64 = 0.30;
 /// Part of the no-load speed by which this measurement may be off: supply and converter by 2 % each,
-/// and the loss of a wheel that touches the wall.
+/// losses that change with the speed by 1 %.
 const UNSURE: f64 = 0.05;
 
 /// The drive, wheel free.
 pub(super) fn drive(session: &mut Session<'_, '_>) -> Result<Vec<Check>, BringupError> {
-    session.operator.confirm(
-        "Wheel free of the wall, current limit low: the DRIVE turns outwards, 15 % for 0.6 s.",
-    )?;
+    session.operator.act(Action::Block)?;
+    session.operator.confirm("Current limit low: the DRIVE turns outwards, 15 % for 0.6 s.")?;
     // Levels that each line of the encoder has had: low, high.
     let mut lines = [[false; 2]; 2];
     let slow = session.line.move_and(drive_by(SLOW), 600, 300, |line| {
@@ -74,9 +73,10 @@ pub(super) fn drive(session: &mut Session<'_, '_>) -> Result<Vec<Check>, Bringup
         near,
         format!("{no_load:.1} mm/s at full duty, parameter {wanted:.1}{}", fault(&fast)),
         &format!(
-            "the motor, its supply's voltage, sense.encoder_counts or rig.wheel_radius_mm is \
-             another: one turn of the wheel by hand must give sense.encoder_counts. If that is \
-             right, set drive.no_load_speed_mm_s = {rounded}"
+            "the wheel wedges where it touches the wall: hold it off; or the motor, its supply's \
+             voltage, sense.encoder_counts or rig.wheel_radius_mm is another: one turn of the wheel \
+             by hand must give sense.encoder_counts. If that is right, set \
+             drive.no_load_speed_mm_s = {rounded}"
         ),
     ));
     if near {

@@ -32,6 +32,10 @@ pub enum Action {
     Unplug(Sensor),
     /// Plug it in again.
     Plug(Sensor),
+    /// Rest the carriage on its stop and hold the wheel off the wall by a block.
+    Block,
+    /// Take the block out: the wheel touches the wall.
+    SetDown,
     /// Rest the carriage on its stop and lift the wheel off the wall.
     LiftOff,
     /// Take off the weight or the gauge.
@@ -50,8 +54,14 @@ impl fmt::Display for Action {
             Self::ReleaseStop => f.write_str("Release the emergency stop."),
             Self::Unplug(sensor) => write!(f, "Unplug the {sensor}."),
             Self::Plug(sensor) => write!(f, "Plug the {sensor} in again."),
+            Self::Block => f.write_str(
+                "Carriage on its stop: hold the arm off by a block, the wheel clear of the wall.",
+            ),
+            Self::SetDown => f.write_str(
+                "No block under the arm: turn the screw by hand until the wheel touches the wall.",
+            ),
             Self::LiftOff => f.write_str(
-                "Carriage on its stop, pre-tightener slack: lift the wheel clear of the wall.",
+                "Carriage on its stop: turn the screw back by hand until the wheel is clear of the wall.",
             ),
             Self::TakeOff(sensor) => write!(f, "Take that off the {sensor} again."),
             Self::HoldReset => f.write_str("Hold the board's reset button for 2 s."),
@@ -88,9 +98,9 @@ impl fmt::Display for Question {
                 "Which way did the wheel turn: outwards as to deploy, inwards, or not (o/i/n)?"
             }
             Self::Supplied => {
-                "Emergency stop still pressed: do the bridges' supply pins have voltage (y/n)?"
+                "Emergency stop pressed for 5 s: do the bridges' supply pins have 3 V or more (y/n)?"
             }
-            Self::MovedInReset => "Did the wheel or the screw move meanwhile (y/n)?",
+            Self::MovedInReset => "Had an output of a bridge voltage meanwhile, or did anything move (y/n)?",
         })
     }
 }

@@ -6,7 +6,7 @@ use interstage::supervise::Mode;
 use super::figures::{Scale, angle, counted, mean, turned};
 use super::line::{Motion, press};
 use super::motion::{CHANGED, bridge, driven, fault};
-use super::{BringupError, Check, Session, check};
+use super::{Action, BringupError, Check, Session, check};
 
 /// Duty of the pre-tightener, and the steps of preload, ms.
 const PRESS: f64 = 0.25;
@@ -57,9 +57,10 @@ impl Level {
 
 /// The pre-tightener: direction, sensors, scale; and back.
 pub(super) fn pretightener(session: &mut Session<'_, '_>) -> Result<Vec<Check>, BringupError> {
-    session.operator.confirm(
-        "Wheel on the wall at the stow end: the PRE-TIGHTENER presses it, 25 % for 0.55 s.",
-    )?;
+    session.operator.act(Action::SetDown)?;
+    // The bounds and zeros are those of this rest.
+    session.line.reset()?;
+    session.operator.confirm("The PRE-TIGHTENER presses the wheel, 25 % for 0.55 s.")?;
     let scale = Scale::of(&session.expected.rig);
     let base = Level::of(&session.line.listen(REST_MS)?, &scale);
     let first = session.line.moved(press(PRESS), STEPS_MS[0], REST_MS)?;

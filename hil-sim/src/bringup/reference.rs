@@ -40,7 +40,7 @@ pub(super) const GAUGE: Reference = Reference {
     what: "gauge",
     unit: "mm",
     key: "sense.tread_full_scale_mm",
-    known: (0.001, 0.01),
+    known: (0.01, 0.01),
     full_scale: |rig| &mut rig.sense.tread_full_scale_mm,
 };
 

@@ -35,9 +35,9 @@ pub(super) fn run(session: &mut Session<'_, '_>) -> Result<Vec<Check>, BringupEr
     checks.push(nothing_seen(
         "held in reset",
         moved,
-        ["nothing moved", "something moved"],
+        ["no voltage", "voltage, or motion"],
         "a pull-down of 3.3 kOhm at a bridge's PWM or enable line is missing (PA8, PA10, PC6, PC9): \
-         the one whose motor moved",
+         that of the bridge with voltage",
     ));
     // What was found stays, whatever the probe finds of the board after its reset.
     if let Err(error) = back(session) {

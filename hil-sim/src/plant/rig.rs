@@ -105,6 +105,8 @@ pub struct VirtualRig {
     sliding: bool,
     /// Force of a weight that hangs on the wheel and pulls it off the wall, N.
     hung_n: f64,
+    /// A block holds the wheel at its height.
+    blocked: bool,
     /// Thickness of a gauge under the compression sensor, mm.
     gauge_mm: Option<f64>,
     /// Held by the stop or latch that carries the load until the drive first turns.
@@ -190,6 +192,7 @@ impl VirtualRig {
             contact_mm: 1.0,
             sliding: false,
             hung_n: 0.0,
+            blocked: false,
             gauge_mm: None,
             latched: true,
             rolled_mm_s: 0.0,

@@ -70,7 +70,13 @@ impl VirtualRig {
         let base = local.base_mm - self.eccentric().1;
         let seat = self.preload.seat_n() + self.parameters.spring_n_per_mm * base;
         let arm = self.thrust_ratio() * self.thrust_n + self.pivot.force_n();
-        (seat, arm - self.vibration_n - self.hung_n)
+        let added = arm - self.vibration_n - self.hung_n;
+        if !self.blocked {
+            return (seat, added);
+        }
+        // A block bears all.
+        let lift = self.truth.height_mm - local.base_mm - self.parameters.ring.radius_mm;
+        (seat, -(seat + self.parameters.spring_n_per_mm * lift).max(0.0))
     }
 
     /// Radial balance over this wall.

@@ -3,6 +3,9 @@
 use super::{Drives, MOST_STRIDES, PlantError, VirtualRig};
 use crate::plant::rolling::Steady;
 
+/// Height of a wheel above the wall that a block holds off, mm.
+const BLOCK_MM: f64 = 3.0;
+
 impl VirtualRig {
     /// Advances by `dt_s` with the wheel turning at this tread speed, mm/s, under this
     /// radial preload, N, in place of motor and pre-tightener. It is the total preload:
@@ -51,11 +54,18 @@ impl VirtualRig {
     /// on it that pulls with this force, N, and a gauge under the compression sensor, mm.
     pub fn lift(&mut self, hung_n: f64, gauge_mm: Option<f64>) {
         (self.hung_n, self.gauge_mm, self.latched) = (hung_n, gauge_mm, true);
+        self.blocked = false;
         let lift = (hung_n - self.preload.seat_n()) / self.parameters.spring_n_per_mm;
         let radius = self.parameters.ring.radius_mm + self.eccentric().1;
         self.truth.height_mm = radius + lift.max(self.base_mm);
         self.settle_timer.for_s = 0.0;
         self.derive();
+    }
+
+    /// Rests the carriage on its stop and holds the wheel by a block, clear of the wall.
+    pub fn block(&mut self) {
+        self.lift(self.preload.seat_n() + self.parameters.spring_n_per_mm * BLOCK_MM, None);
+        (self.hung_n, self.blocked) = (0.0, true);
     }
 
     /// The preload spring keeps this part of its rate, and with it of its force.

@@ -96,7 +96,7 @@ impl VirtualRig {
             }
         };
         let shear = p.shear();
-        if turn.free_mm_s != 0.0 && self.latched {
+        if turn.free_mm_s != 0.0 && self.latched && !self.blocked {
             self.latched = false;
             // The latch lets go as the tread takes over the load.
             self.wind_up = WindUp::steady(&shear, p.load_n, 0.0, self.contact_mm);
@@ -128,7 +128,7 @@ impl VirtualRig {
             stopped: false,
             winding: grip.winding,
         };
-        if self.latched {
+        if self.latched && !self.blocked {
             return stride;
         }
         stride.moves = Moves::Driven(grip);
@@ -141,10 +141,11 @@ impl VirtualRig {
         self.thrust_n = p.load_n;
         stride.travel_mm = self.mean(self.truth.speed_mm_s, stride.predicted.0) * dt_s
             + self.distance_residual_mm.0;
-        let (low, high) = p.stops_mm;
-        let position = self.truth.position_mm + stride.travel_mm;
-        if position < low || position > high {
-            stride.travel_mm = position.clamp(low, high) - self.truth.position_mm;
+        let at = self.truth.position_mm;
+        let (low, high) = if self.blocked { (at, at) } else { p.stops_mm };
+        let position = at + stride.travel_mm;
+        if self.blocked || position < low || position > high {
+            stride.travel_mm = position.clamp(low, high) - at;
             let friction = grip.mu.copysign(grip.tread);
             let slower = grip.tread - grip.yields * friction * normal;
             // The wheel spins, and presses itself in by what it pushes with; or it stands.
@@ -160,7 +161,7 @@ impl VirtualRig {
             stride.stopped = true;
             self.thrust_n = if spins { friction * cosine - sine } else { p.load_n };
         }
-        stride.position_mm = self.truth.position_mm + stride.travel_mm;
+        stride.position_mm = at + stride.travel_mm;
         let rolled = self.mean(tread, stride.tread_mm_s) * dt_s + self.distance_residual_mm.1;
         stride.turn_rad = rolled / p.ring.radius_mm;
         stride
