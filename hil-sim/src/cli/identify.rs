@@ -15,7 +15,7 @@ use crate::table::{number, plain, width, wrapped};
 use crate::{files, progress};
 use clap::builder::PossibleValuesParser;
 
-/// Identifies a rig's parameters from its logs, each with an interval; all hold in nine of ten rigs.
+/// Identifies a rig's parameters from its logs, each with an interval; all hold in 19 of 20 rigs.
 ///
 /// Several logs of one rig give narrower intervals: a scheduled deployment and two at constant
 /// preloads, one light, one heavy; logs of several rigs are refused. Writes a scenario file with what was identified and a

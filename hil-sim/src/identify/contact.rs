@@ -165,22 +165,3 @@ pub(super) fn refit(
     let residuals = model.remaining(&fitted.x, &fitted.at);
     Ok(Contact { covariance, trajectories: fitted.at, x: fitted.x, residuals })
 }
-
-/// By how much more these logs are off with the second of two frictions than with the first, in squares
-/// of deviations; all else is fitted to each, from `fitted` on.
-pub(super) fn prefers(
-    runs: &[Run],
-    coordinates: &Coordinates,
-    fitted: &Contact,
-    frictions: [f64; 2],
-) -> f64 {
-    let [first, second] = frictions.map(|mu| {
-        let held = coordinates.known(FRICTION, mu.ln(), HELD_LN);
-        let mut model = Weighted::new(runs, &held);
-        model.reweigh(&fitted.x, &fitted.trajectories);
-        let mut from = fitted.x.clone();
-        from[FRICTION] = mu.ln();
-        minimise(&model, &from, NEAR).map_or(f64::INFINITY, |of| of.residuals.norm_squared())
-    });
-    second - first
-}
