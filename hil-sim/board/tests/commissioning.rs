@@ -125,7 +125,7 @@ const CHANGES: [Change; 5] = [
 ];
 
 /// First of the seeds.
-const FIRST: u64 = 7_700_001;
+const FIRST: u64 = 7_800_001;
 
 /// Commissions the rig of a seed: keys outside their interval, why it is not accepted, and after which
 /// of the changes it still is.

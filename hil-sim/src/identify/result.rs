@@ -23,8 +23,6 @@ pub(super) const WITHIN: f64 = 3.1;
 /// Part of the prior deviation that the logs must leave for a parameter to count as
 /// identified: where nothing was known, and where a tolerance was.
 const LEAVES: (f64, f64) = (0.1, 0.5);
-/// Variance of rounding a dead time to ticks, ms^2.
-const TICK_VARIANCE: f64 = 1.0 / 12.0;
 /// Evidence of a parameter that has none.
 const NOTHING: &str = "not in these logs";
 
@@ -260,7 +258,7 @@ impl Document<'_> {
             let relative = variance(index) / (x[index] * x[index]) + gain_variance;
             around(name, unit, value, value.abs() * relative.sqrt())
         };
-        let delay = (variance(actuator::DELAY) + TICK_VARIANCE).sqrt();
+        let delay = variance(actuator::DELAY).sqrt();
         let (lag, deviation) = (x[actuator::LAG], variance(actuator::LAG).sqrt());
         let lag = [lag, lag - WITHIN * deviation, lag + WITHIN * deviation].map(f64::exp);
         vec![
