@@ -12,6 +12,8 @@ use super::port::gone;
 
 /// Travel of the tread that an eye sees, mm.
 const SEEN_MM: f64 = 0.5;
+/// Time for which the emergency stop is pressed while a hand reaches in, ms.
+const REACHES_MS: u32 = 200;
 /// Time for which a hand holds the reset button, ms.
 const RESET_MS: u32 = 300;
 
@@ -82,6 +84,13 @@ impl<O: Operator> Operator for Person<'_, O> {
     fn act(&mut self, action: Action) -> Result<(), BringupError> {
         let mut bench = self.bench.borrow_mut();
         self.tread_mm = bench.tread_mm();
+        let reaches_in = matches!(action, Action::Block | Action::SetDown | Action::LiftOff);
+        if reaches_in {
+            bench.wiring.stop_pressed = true;
+            bench.connect();
+            (0..REACHES_MS).try_for_each(|_| bench.pass())?;
+            bench.wiring.stop_pressed = false;
+        }
         let wiring = &mut bench.wiring;
         match action {
             Action::SwitchOn => wiring.switched_off = false,

@@ -7,6 +7,7 @@ use hil_sim::probe::Port;
 use hil_sim::scenario::{Direction, Scenario};
 use rig_board::bench::Bench;
 use rig_board::bringup::Attended;
+use rig_board::wiring::Mistake;
 
 use crate::common::{OnUsb, elf, strings};
 
@@ -46,6 +47,15 @@ fn a_rig_goes_home_and_lets_go_and_is_not_zeroed_while_the_load_wedges_its_arm()
     assert!(bench.plant.truth().preload_n < 1.0, "{release:?}");
     let zero = done(&mut bench, Operation::Zero);
     assert!(!zero.done && zero.note.starts_with("no zeros taken"), "{zero:?}");
+}
+
+#[test]
+fn a_release_that_presses_ends_after_one_motion() {
+    let mistakes = [Mistake::PretightenerLeads];
+    let mut bench = Bench::wired(elf(), strings(), &Scenario::default(), &mistakes).expect("wired");
+    let release = done(&mut bench, Operation::Release);
+    assert!(!release.done && release.note.starts_with("the preload rises"), "{release:?}");
+    assert!((1.0..10.0).contains(&bench.plant.truth().preload_n), "{release:?}");
 }
 
 #[test]

@@ -20,6 +20,8 @@ const UNSURE: f64 = 0.05;
 /// The drive, wheel free.
 pub(super) fn drive(session: &mut Session<'_, '_>) -> Result<Vec<Check>, BringupError> {
     session.operator.act(Action::Block)?;
+    // The emergency stop was pressed meanwhile.
+    session.line.reset()?;
     session.operator.confirm("Current limit low: the DRIVE turns outwards, 15 % for 0.6 s.")?;
     // Levels that each line of the encoder has had: low, high.
     let mut lines = [[false; 2]; 2];

@@ -264,6 +264,12 @@ impl Doing<'_, '_> {
                 return Ok((false, words(self.mode())));
             }
             let now = self.level().0;
+            if now - before > CHANGED.0 {
+                let note =
+                    "the preload rises: the pre-tightener's leads are swapped, or the sensor's";
+                self.reset()?;
+                return Ok((false, note.to_owned()));
+            }
             if (self.stopped)() || (before - now).abs() < CHANGED.0 {
                 let is_slack = now.abs() < UNLOADED_N;
                 let note = if is_slack {

@@ -58,7 +58,7 @@ impl Level {
 /// The pre-tightener: direction, sensors, scale; and back.
 pub(super) fn pretightener(session: &mut Session<'_, '_>) -> Result<Vec<Check>, BringupError> {
     session.operator.act(Action::SetDown)?;
-    // The bounds and zeros are those of this rest.
+    // The emergency stop was pressed meanwhile; the bounds and zeros are those of this rest.
     session.line.reset()?;
     session.operator.confirm("The PRE-TIGHTENER presses the wheel, 25 % for 0.55 s.")?;
     let scale = Scale::of(&session.expected.rig);

@@ -34,6 +34,8 @@ pub(super) fn run(session: &mut Session<'_, '_>) -> Result<Vec<Check>, BringupEr
         "Carriage on its stop at the stow end, preload off: the DRIVE turns the wheel inwards, 15 % \
          and 30 % for 1 s.",
     )?;
+    // The emergency stop was pressed for what hands did before.
+    session.line.reset()?;
     let base = Level::of(&session.line.listen(REST_MS)?, &scale);
     // Speed of the tread inwards, mm/s; rows after it; and the fault that ended it.
     let pull = |session: &mut Session<'_, '_>, duty: f64| -> Result<_, BringupError> {
