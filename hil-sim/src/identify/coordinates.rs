@@ -55,7 +55,7 @@ const COMPLIANCE_LN: f64 = 0.2;
 const START_MM: f64 = 0.25;
 /// Elements of the forward model's ring for one of the plant's. Elements meet a corner one by one. Those
 /// of a log do so at places that no model knows. A ring as coarse follows them: friction or load were
-/// outside their intervals in 3 of 93 hidden rigs, with this one in none of 96.
+/// outside their intervals in 3 of 96 hidden rigs, with this one in none.
 const FINER: usize = 4;
 /// Deviation of a coordinate that is stated without tolerance.
 const EXACT: f64 = 1e-6;
