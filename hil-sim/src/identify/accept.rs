@@ -32,8 +32,8 @@ enum Limit {
     Part(f64),
     /// In the key's unit.
     Of(f64),
-    /// Part by which it may be less than stated, and part of which it must surely be more, by 19 to 1. How
-    /// much more there is hardly shows, and costs no grip.
+    /// The first: part by which it may be less than stated. The second: part of the stated value that
+    /// it must exceed, by 19 to 1. How much more there is hardly shows, and costs no grip.
     Less(f64, f64),
 }
 
