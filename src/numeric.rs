@@ -12,8 +12,8 @@ mod sine;
 
 pub use build::{checked, cosine_of_turns};
 pub use divide::{Divisor, divide, part, reciprocal_of_normalised};
-pub use high::high;
 pub(crate) use high::horner;
+pub use high::{high, high_unsigned};
 pub use low_pass::{LowPass, LowPassState};
 pub use roots::sqrt;
 pub use sine::sin_cos;

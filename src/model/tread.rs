@@ -19,9 +19,9 @@ mod rays;
 mod relaxation;
 mod state;
 
-use crate::numeric::{between, divide, high, sqrt};
+use crate::numeric::{between, divide, high, high_unsigned, sqrt};
 use crate::units::{Direction, Millimetres, Newtons, Q16, Ratio, Seconds, q16};
-use rays::{AHEAD, BEHIND, ray};
+use rays::{AHEAD, BEHIND, Ray, ahead, behind, tangent};
 use relaxation::Stride;
 
 pub use state::TreadState;
@@ -110,15 +110,23 @@ struct Facets {
     top: i32,
 }
 
+/// What an element touches.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Facet {
+    Floor,
+    Face,
+    Top,
+}
+
 /// Sums over the elements in contact.
 #[derive(Clone, Copy, Debug, Default)]
 struct Sums {
-    /// Pressure, mm, by cosine and sine, Q46.
-    cos: i64,
-    sin: i64,
+    /// Pressure, mm, by cosine, and by sine behind straight down and ahead of it, Q46.
+    cos: u64,
+    sin: [u64; 2],
     /// Elements whose depth changes with the height, and their tangents, Q29.
     moves: i32,
-    tan: i64,
+    tan: [u64; 2],
     /// Largest pressure on the lower wall, mm, Q16.
     floor: i32,
     visits: u32,
@@ -234,7 +242,7 @@ impl Tread {
         let first = |height: i32, from: i32| {
             let beyond = |place: &i32| {
                 // Q22 x Q29 to Q19.
-                ray(*place).is_none_or(|ray| high(height, ray.tan) >= to_face >> 3)
+                tangent(*place).is_none_or(|tan| high(height, tan) >= to_face >> 3)
             };
             let (mut low, mut high) = (from, AHEAD);
             while low < high {
@@ -247,79 +255,71 @@ impl Tread {
         let face = if to_face > 0 { first(state.centre, 0).min(top) } else { top };
         Facets { face, top }
     }
-
-    /// Depth along this ray, mm, Q22.
-    fn depth(&self, state: &Frame, place: i32, facets: Facets) -> i32 {
-        let Some(ray) = ray(place) else { return i32::MIN };
-        if place < facets.face {
-            self.radius - (high(state.centre, ray.sec) << 3)
-        } else if place >= facets.top {
-            self.radius - (high(state.centre - self.height, ray.sec) << 3)
-        } else {
-            // x / sin a = x / (cos a tan a): by division, the face has few rays.
-            let to_face = Q16::from_bits(-state.position >> 6);
-            let distance = divide(to_face, Q16::from_bits(ray.sin >> 14));
-            self.radius - (distance.to_bits() << 6)
-        }
-    }
 }
 
 impl Tread {
-    /// Calls for each element that touches the wall: its place and depth, and whether it is on the
-    /// lower wall and whether on the face. Gives the places visited there and on the step.
+    /// Calls for each element that touches the wall: its place, ray and depth, mm, Q22, what it
+    /// touches, and whether it may be ahead of straight down. Gives the places visited on the lower
+    /// wall and on the step.
     #[inline(always)]
     fn touching(
         &self,
         state: &Frame,
         facets: Facets,
-        mut visit: impl FnMut(i32, i32, bool, bool),
+        mut visit: impl FnMut(i32, &Ray, i32, Facet, bool),
     ) -> [Patch; 2] {
-        let mut run = |from: i32, ahead: bool, until: i32, floor: bool, face: bool| {
-            let mut place = from;
-            while place != until {
-                let depth = self.depth(state, place, facets);
-                if depth <= 0 {
-                    break;
-                }
-                visit(place, depth, floor, face);
-                place += if ahead { 1 } else { -1 };
-            }
-            place
+        let wall = |height: i32| move |ray: &Ray| self.radius - (high(height, ray.sec) << 3);
+        let (floor, top) = (wall(state.centre), wall(state.centre - self.height));
+        // x / sin a = x / (cos a tan a): by division, the face has few rays.
+        let to_face = Q16::from_bits(state.position.saturating_neg() >> 6);
+        let face = |ray: &Ray| {
+            let sin = Q16::from_bits((ray.sin >> 14) as i32);
+            self.radius - (divide(to_face, sin).to_bits() << 6)
         };
-        let bottom = 0.min(facets.face - 1);
-        let low = run(bottom, false, -BEHIND - 1, true, false) + 1;
-        let high = run(bottom + 1, true, facets.face.min(AHEAD).max(bottom + 1), true, false);
-        let floor = Patch { low, high };
+        let below = facets.face.min(1);
+        let low = below
+            - behind(below, -BEHIND, floor, |at, ray, depth| {
+                visit(at, ray, depth, Facet::Floor, false)
+            });
+        let high = below
+            + ahead(below, facets.face, floor, |at, ray, depth| {
+                visit(at, ray, depth, Facet::Floor, true)
+            });
         let corner = facets.top.max(0);
-        let high = run(corner, true, AHEAD.max(corner), false, false);
-        let end = run(corner - 1, false, facets.top - 1, false, false);
-        let low = if end < facets.top {
-            run(facets.top - 1, false, facets.face - 1, false, true)
-        } else {
-            end
-        };
-        [floor, Patch { low: low + 1, high }]
+        let end = corner
+            + ahead(corner, AHEAD, top, |at, ray, depth| visit(at, ray, depth, Facet::Top, true));
+        let mut begin = corner
+            - behind(corner, facets.top, top, |at, ray, depth| {
+                visit(at, ray, depth, Facet::Top, false)
+            });
+        if begin == facets.top {
+            begin -= behind(begin, facets.face, face, |at, ray, depth| {
+                visit(at, ray, depth, Facet::Face, true)
+            });
+        }
+        [Patch { low, high }, Patch { low: begin, high: end }]
     }
 
     /// Sums over the contact at the present height.
     fn sums(&self, state: &TreadState, stride: &Stride, facets: Facets) -> Sums {
         let mut sums = Sums { floor: i32::MIN, ..Sums::default() };
-        self.touching(&state.frame, facets, |place, depth, floor, face| {
+        // Unsigned products: the core adds them up at once.
+        let loads = stride.loads as u32;
+        self.touching(&state.frame, facets, |place, ray, depth, facet, is_ahead| {
             sums.visits += 1;
             let Element { memory, depth: before } = state.element(place);
             let relief = high(memory, stride.relieves) + high(before, stride.relieved);
-            let pressure = high(depth, stride.loads) - relief;
-            if floor {
+            let pressure = high_unsigned(depth as u32, loads) as i32 - relief;
+            if facet == Facet::Floor {
                 sums.floor = sums.floor.max(pressure);
             }
-            if pressure > 0
-                && let Some(ray) = ray(place)
-            {
-                sums.cos += i64::from(pressure) * i64::from(ray.cos);
-                sums.sin += i64::from(pressure) * i64::from(ray.sin);
-                if !face {
+            if pressure > 0 {
+                let by = |factor: u32| u64::from(pressure as u32) * u64::from(factor);
+                sums.cos += by(ray.cos);
+                sums.sin[usize::from(is_ahead)] += by(ray.sin);
+                if facet != Facet::Face {
                     sums.moves += 1;
-                    sums.tan += i64::from(ray.tan);
+                    sums.tan[usize::from(is_ahead)] += u64::from(ray.tan);
                 }
             }
         });
@@ -329,20 +329,24 @@ impl Tread {
     /// Moves the elements' memory to the stride's end; what has left the wall is fresh.
     fn commit(&self, state: &mut TreadState, stride: &Stride, facets: Facets) {
         let TreadState { frame, elements, patches } = state;
-        let touched = self.touching(frame, facets, |place, depth, _, _| {
+        let touched = self.touching(frame, facets, |place, _, depth, _, _| {
             let Some(element) = elements.get_mut(frame.index(place)) else { return };
             let memory = high(element.memory, stride.keeps)
-                + high(depth, stride.takes)
+                + high_unsigned(depth as u32, stride.takes as u32) as i32
                 + high(element.depth, stride.took);
             *element = Element { memory: memory << 1, depth };
         });
         for patch in &*patches {
-            for place in patch.low..patch.high {
-                if !touched.iter().any(|now| now.has(place))
-                    && let Some(element) = elements.get_mut(frame.index(place))
-                {
+            let mut place = patch.low;
+            while place < patch.high {
+                if let Some(now) = touched.iter().find(|now| now.has(place)) {
+                    place = now.high;
+                    continue;
+                }
+                if let Some(element) = elements.get_mut(frame.index(place)) {
                     *element = Element::default();
                 }
+                place += 1;
             }
         }
         *patches = touched;
@@ -354,10 +358,11 @@ impl Tread {
         let rate = self.rate * drive.scale;
         let pressed = divide(drive.pressed, rate);
         let depth = |sum: i64| Q16::saturating_from_bits(sum >> 30);
-        let (c, s) = (depth(sums.cos), depth(sums.sin));
+        let less = |[behind, ahead]: [u64; 2]| ahead.wrapping_sub(behind) as i64;
+        let (c, s) = (depth(sums.cos as i64), depth(less(sums.sin)));
         let loads = Q16::from_bits(stride.loads >> 10);
         let dc = -(loads * Q16::from_num(sums.moves));
-        let ds = -(loads * Q16::saturating_from_bits(sums.tan >> 13));
+        let ds = -(loads * Q16::saturating_from_bits(less(sums.tan) >> 13));
         let used = |c: Q16, s: Q16| match drive.axial {
             Axial::Pushed => Q16::ZERO,
             Axial::Driven(_) if c <= Q16::ZERO => Q16::ZERO,

@@ -181,12 +181,18 @@ impl Shear {
 impl Spread {
     /// A tick.
     pub fn step(&mut self) {
+        let gives = self.eases();
+        self.gave = self.gave.saturating_add(gives);
+        self.held = self.held.saturating_add(self.gives);
+    }
+
+    /// A tick of which the sums are not asked for; what gives way in it.
+    pub fn eases(&mut self) -> Travel {
         let gives = self.owes >> SMOOTH;
         self.owes -= gives;
-        self.gave = self.gave.saturating_add(gives);
         let (asked, smooth) = if self.stops { (Travel::ZERO, SMOOTH) } else { (gives, SMOOTHER) };
         self.gives += (asked - self.gives) >> smooth;
-        self.held = self.held.saturating_add(self.gives);
+        gives
     }
 
     /// By how much more it has given way than the drive makes up for, mm.

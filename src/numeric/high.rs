@@ -8,6 +8,12 @@ pub const fn high(a: i32, b: i32) -> i32 {
     ((a as i64 * b as i64) >> 32) as i32
 }
 
+/// The same of two numbers without a sign.
+#[inline(always)]
+pub const fn high_unsigned(a: u32, b: u32) -> u32 {
+    ((a as u64 * b as u64) >> 32) as u32
+}
+
 /// Polynomial `c0 + c1 t + c2 t^2 + ...` for `t / 2^32` from -1/2 to 1/2, by Horner's rule.
 ///
 /// Coefficients and value in one format. Range: the sum `|c0| + |c1|/2 + |c2|/4` and so on is

@@ -171,7 +171,7 @@ impl Planner {
                 let travel = Q16::narrow(per_tick(follower.speed())) * Q16::from_num(passed);
                 left -= travel;
                 for _ in 0..passed {
-                    spread.step();
+                    spread.eases();
                     left -= sense * Q16::narrow(spread.gives);
                 }
                 distance -= travel * per_tread;

@@ -7,22 +7,70 @@ pub(super) const AHEAD: i32 = 128;
 /// Angle between two rays, rad: on the published wheel an element is 0.2 mm of tread.
 pub(super) const PITCH: f64 = 0.008;
 
-/// Sine and cosine, Q30, and secant and tangent, Q29, of a ray's angle from straight down, ahead
-/// positive.
+/// Magnitudes of sine and cosine, Q30, and of secant and tangent, Q29, of a ray's angle from straight
+/// down.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ray {
-    pub(super) sin: i32,
-    pub(super) cos: i32,
+    pub(super) sin: u32,
+    pub(super) cos: u32,
     pub(super) sec: i32,
-    pub(super) tan: i32,
+    pub(super) tan: u32,
 }
 
 /// All rays, the hindmost first.
 pub(super) static RAYS: [Ray; (BEHIND + AHEAD) as usize] = table();
 
-/// The ray that many places ahead of straight down, none beyond the ends.
-pub(super) fn ray(place: i32) -> Option<&'static Ray> {
-    RAYS.get(usize::try_from(place + BEHIND).ok()?)
+/// Tangent of the ray that many places ahead of straight down, Q29, none beyond the ends.
+pub(super) fn tangent(place: i32) -> Option<i32> {
+    let ray = RAYS.get(usize::try_from(place + BEHIND).ok()?)?;
+    Some(ray.tan as i32 * place.signum())
+}
+
+/// Visits places from `from` to before `until` as long as the depth along their rays is positive.
+/// Gives their number.
+#[inline(always)]
+pub(super) fn ahead(
+    from: i32,
+    until: i32,
+    depth: impl Fn(&Ray) -> i32,
+    mut visit: impl FnMut(i32, &Ray, i32),
+) -> i32 {
+    let mut place = from;
+    for ray in between(from, until) {
+        let depth = depth(ray);
+        if depth <= 0 {
+            break;
+        }
+        visit(place, ray, depth);
+        place += 1;
+    }
+    place - from
+}
+
+/// The same backwards, from before `from` down to `until`.
+#[inline(always)]
+pub(super) fn behind(
+    from: i32,
+    until: i32,
+    depth: impl Fn(&Ray) -> i32,
+    mut visit: impl FnMut(i32, &Ray, i32),
+) -> i32 {
+    let mut place = from;
+    for ray in between(until, from).iter().rev() {
+        let depth = depth(ray);
+        if depth <= 0 {
+            break;
+        }
+        place -= 1;
+        visit(place, ray, depth);
+    }
+    from - place
+}
+
+/// Rays of the places from `low` to before `high`, none if a place has none.
+fn between(low: i32, high: i32) -> &'static [Ray] {
+    let index = |place: i32| usize::try_from(place + BEHIND).unwrap_or(usize::MAX);
+    RAYS.get(index(low)..index(high)).unwrap_or_default()
 }
 
 const fn table() -> [Ray; (BEHIND + AHEAD) as usize] {
@@ -48,10 +96,10 @@ const fn at(place: i64) -> Ray {
     }
     let [cos, sin] = sums;
     Ray {
-        sin: (sin >> 30) as i32,
-        cos: (cos >> 30) as i32,
+        sin: (sin >> 30).unsigned_abs() as u32,
+        cos: (cos >> 30) as u32,
         sec: ((ONE << 29) / cos) as i32,
-        tan: ((sin << 29) / cos) as i32,
+        tan: ((sin << 29) / cos).unsigned_abs() as u32,
     }
 }
 
@@ -63,17 +111,17 @@ mod tests {
     fn every_ray_is_at_its_angle() {
         for place in -BEHIND..AHEAD {
             let (sin, cos) = (f64::from(place) * PITCH).sin_cos();
-            let got = ray(place).expect("within");
+            let [got] = between(place, place + 1) else { panic!("within") };
             for (bits, exact, one) in [
-                (got.sin, sin, 30),
-                (got.cos, cos, 30),
-                (got.sec, 1.0 / cos, 29),
-                (got.tan, sin / cos, 29),
+                (f64::from(got.sin), sin.abs(), 30),
+                (f64::from(got.cos), cos, 30),
+                (f64::from(got.sec), 1.0 / cos, 29),
+                (f64::from(tangent(place).expect("within")), sin / cos, 29),
             ] {
-                let error = f64::from(bits) - exact * f64::from(1 << one);
+                let error = bits - exact * f64::from(1 << one);
                 assert!(error.abs() <= 1.0, "{place}: {error} LSB");
             }
         }
-        assert!(ray(-BEHIND - 1).is_none() && ray(AHEAD).is_none());
+        assert!(tangent(-BEHIND - 1).is_none() && tangent(AHEAD).is_none());
     }
 }
