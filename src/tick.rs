@@ -191,8 +191,10 @@ impl Controller {
     }
 
     fn look_for_faults(&self, state: &mut State, tick: &mut Pass<'_>, input: &Input) {
-        // A corner's force is fed forward on the way out alone.
-        let unknown = state.estimate.on_corner() && state.estimate.direction == Direction::Retract;
+        // A corner's force is fed forward on the way out alone, by a place that is known.
+        let estimate = &state.estimate;
+        let unknown = estimate.on_corner()
+            && (estimate.direction == Direction::Retract || estimate.is_searching());
         let steady = state.profile.acceleration() == Q16::ZERO && !unknown;
         let observed = Observed {
             now: tick.now,

@@ -35,10 +35,11 @@ const ARM_TICKS: u8 = 32;
 const ARM_BEYOND: Millimetres = q16(250_000);
 /// Least speed at which duty and speed are compared, mm/s.
 const TELLING: MillimetresPerSecond = q16(10_000_000);
-/// Least and largest duty beyond the feed-forward at cruise: gearbox friction and rolling
-/// resistance make 0.02 to 0.07, twice the top load 0.05 more, a motor that is off by 5 % 0.03
-/// in either direction.
-const EFFORT: (Ratio, Ratio) = (q16(-50_000), q16(130_000));
+/// Least and largest duty beyond the feed-forward at cruise: gearbox friction makes 0.02, a motor
+/// that is off by 5 % 0.03 in either direction; and by its force, twice the load one load more, the
+/// rolling resistance this part of the preload.
+const EFFORT: f64 = 0.05;
+const ROLLS: f64 = 0.14;
 /// Ticks for which it must be outside: more than two time constants of the loop, in which it
 /// settles after a corner.
 const EFFORT_TICKS: u16 = 120;
@@ -75,6 +76,8 @@ pub(super) struct CrossCheck {
     lag: Millimetres,
     /// See [`START_LAG_MM`], mm.
     start_lag: Millimetres,
+    /// See [`EFFORT`].
+    effort: (Ratio, Ratio),
     /// See [`SHORT_LATENCIES`] and [`STRAYED`], N.
     pub(super) short: Newtons,
     strayed: Newtons,
@@ -189,7 +192,10 @@ impl CrossCheck {
         let short = late.max(SHORT_PART * rig.preload.cruise_n);
         let span_s = 1e-3 * SPAN as f64;
         let bent = BENT_ACCELERATIONS * rig.drive.acceleration_mm_s2 * span_s * span_s;
+        let resists = rig.plant.top_load_n * rig.plant.top_load_share + ROLLS * rig.preload.limit_n;
+        let effort = |duty: f64| checked("drive.stall_force_n", duty);
         Ok(Self {
+            effort: (effort(-EFFORT)?, effort(EFFORT + resists / rig.drive.stall_force_n)?),
             bent: counts(bent.max(BENT_COUNTS * count_mm))?,
             off: counts(off_reference_mm(rig))?,
             progress: counts(PROGRESS_COUNTS * count_mm)?,
@@ -243,7 +249,7 @@ impl CrossCheck {
         let arm = fresh && arm_runs_ahead(state, seen);
         let effort = seen.effort.is_some_and(|effort| {
             let along = if seen.speed_ref < Q16::ZERO { -effort } else { effort };
-            seen.speed_ref.abs() > TELLING && !(EFFORT.0..=EFFORT.1).contains(&along)
+            seen.speed_ref.abs() > TELLING && !(self.effort.0..=self.effort.1).contains(&along)
         });
         let effort = lasts(&mut state.effort, effort, EFFORT_TICKS);
         bent.then_some(Fault::DriveRunaway)
