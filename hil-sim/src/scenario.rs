@@ -123,8 +123,7 @@ impl Scenario {
         Self::layered(preset, file.map(merge::read).transpose()?, sets)
     }
 
-    /// As [`Scenario::resolve`], with the text of the file; `name` is its
-    /// path in messages.
+    /// As [`Scenario::resolve`], with the text of the file; `name` is its path in messages.
     pub fn parse(name: &str, text: &str, sets: &[String]) -> Result<Self, ScenarioError> {
         Self::layered(None, Some((name.to_owned(), merge::parse(name, text)?)), sets)
     }
@@ -185,8 +184,7 @@ impl Scenario {
 
     /// The `count` seeds that follow this one.
     ///
-    /// # Errors
-    /// If a scenario cannot have the last of them.
+    /// # Errors If a scenario cannot have the last of them.
     pub(crate) fn seeds(&self, count: u64) -> Result<Vec<u64>, ScenarioError> {
         let seed = self.run.seed;
         let last = seed.checked_add(count).filter(|last| i64::try_from(*last).is_ok());

@@ -187,7 +187,8 @@ mod tests {
             error in -0.2..0.2f64,
         ) {
             let got = found(at, slip, rate, noise, (error, 0.0));
-            prop_assert!((got - slip).abs() < 0.15 + 0.18 * slip, "{got} of {slip}");
+            // At most what the reference lets pass: see SLIP_SIGMA.
+            prop_assert!((got - slip).abs() < 0.15 + 0.34 * slip, "{got} of {slip}");
         }
 
         #[test]

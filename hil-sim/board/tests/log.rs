@@ -82,8 +82,7 @@ impl Ticks {
         [sum as f64 / cycles.len() as f64, cycles[last - cut] as f64]
     }
 
-    /// Deviation of the beginnings from an even beat, cycles, and from the earliest to the
-    /// latest.
+    /// Deviation of the beginnings from an even beat, cycles, and from the earliest to the latest.
     fn jitter(&self) -> [f64; 2] {
         let first = self.starts[0] / STEP;
         let phase = |(tick, at): (u64, &u64)| *at as f64 - ((first + tick) * STEP) as f64;

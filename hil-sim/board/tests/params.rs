@@ -98,8 +98,7 @@ fn parameters_are_read_changed_saved_and_restored() {
     assert_eq!((&again["name"], &again["hash"]), (&"mine".into(), &set["hash"]));
 }
 
-/// What a board with this flash says in so many milliseconds, and whether a bridge was
-/// driven.
+/// What a board with this flash says in so many milliseconds, and whether a bridge was driven.
 fn powered(flash: &[u8], milliseconds: u32) -> (Vec<String>, bool) {
     let mut board = Board::off(&[]);
     board.machine().poke(PARAMETER_SETS, flash).expect("flash");

@@ -91,8 +91,7 @@ fn number(value: &Value, key: &str) -> f64 {
     value[key].as_f64().unwrap_or_else(|| panic!("{key} is no number in {value}"))
 }
 
-/// Runs the command in `directory` and expects it to refuse in one line that names each of
-/// `names`.
+/// Runs the command in `directory` and expects it to refuse in one line that names each of `names`.
 pub(crate) fn refused_in(directory: &Path, arguments: &[&str], names: &[&str]) {
     let output = rig_in(directory, arguments);
     let text = stderr(&output);

@@ -56,8 +56,7 @@ fn a_run_is_the_same_with_skipping_and_without() {
 
 #[test]
 fn memory_evaluated_lazily_is_the_same() {
-    // Back and forth, so that elements return with their memory: closed form against step by
-    // step.
+    // Back and forth, so that elements return with their memory: closed form against step by step.
     let ends = [false, true].map(|all| {
         let mut plant = nominal("prototype");
         plant.wall = Wall::new(vec![Step { position_mm: 50.0, height_mm: 4.0 }]);

@@ -40,8 +40,7 @@ fn stems(ending: &str) -> BTreeSet<String> {
     ours.map(|path| path.file_stem().expect("a name").to_string_lossy().into_owned()).collect()
 }
 
-/// The recordings by name: two plain runs, those of the scenarios beside them, those with
-/// resets.
+/// The recordings by name: two plain runs, those of the scenarios beside them, those with resets.
 fn names() -> BTreeSet<String> {
     let mut names = stems("toml");
     names.extend(["deploy", "retract"].map(str::to_owned));

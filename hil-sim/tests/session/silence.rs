@@ -66,8 +66,7 @@ fn a_wheel_that_grips_is_not_said_to_slip() {
         assert!(summary.faults.is_empty() && summary.slip_mm == 0.0, "{seed} {:?}", summary.faults);
         // 30160 ends 1.003 mm short, where 0.43 mm is stated for a sigma.
         assert!((summary.travel_mm - 80.0).abs() < 1.01, "{seed} {}", summary.travel_mm);
-        let named = summary.crossings.iter().filter_map(|line| line.slip_measured_mm);
-        let named: Vec<f64> = named.collect();
+        let named: Vec<f64> = summary.crossings.iter().filter_map(|c| c.slip_measured_mm).collect();
         assert!(named.len() == 3 && named.iter().all(|slip| *slip < 0.12), "{seed}: {named:?}");
     }
 }

@@ -1,5 +1,4 @@
-//! The supervisor from its output side: the bridges' commands in every mode, whatever the
-//! input.
+//! The supervisor from its output side: the bridges' commands in every mode, whatever the input.
 
 use std::collections::BTreeMap;
 

@@ -77,8 +77,7 @@ impl Rod {
     ///
     /// Equation: `rho v_t = -sigma_x`, `eps_t = -v_x`,
     /// `sigma + p_1 sigma_t = q_0 eps + q_1 eps_t`, as waves P and Q with
-    /// `sigma = P + Q`, `rho c v = P - Q`, c the speed of the front.
-    /// Cost: a few operations a cell.
+    /// `sigma = P + Q`, `rho c v = P - Q`, c the speed of the front. Cost: a few operations a cell.
     pub fn step(&mut self, face_pa: f64) {
         self.relax();
         self.carry(face_pa);
