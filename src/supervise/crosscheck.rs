@@ -37,9 +37,11 @@ const ARM_BEYOND: Millimetres = q16(250_000);
 const TELLING: MillimetresPerSecond = q16(10_000_000);
 /// Least and largest duty beyond the feed-forward at cruise: gearbox friction makes 0.02, a motor
 /// that is off by 5 % 0.03 in either direction; and by its force, twice the load one load more, the
-/// rolling resistance this part of the preload.
+/// rolling resistance this part of the preload. At least half of what an encoder makes that reads two
+/// thirds: this part of the duty at cruise.
 const EFFORT: f64 = 0.05;
 const ROLLS: f64 = 0.14;
+const MISREAD: f64 = 0.25;
 /// Ticks for which it must be outside: more than two time constants of the loop, in which it
 /// settles after a corner.
 const EFFORT_TICKS: u16 = 120;
@@ -193,9 +195,11 @@ impl CrossCheck {
         let span_s = 1e-3 * SPAN as f64;
         let bent = BENT_ACCELERATIONS * rig.drive.acceleration_mm_s2 * span_s * span_s;
         let resists = rig.plant.top_load_n * rig.plant.top_load_share + ROLLS * rig.preload.limit_n;
+        let misread = MISREAD * rig.drive.cruise_speed_mm_s / rig.drive.no_load_speed_mm_s;
+        let most = (EFFORT + resists / rig.drive.stall_force_n).max(misread);
         let effort = |duty: f64| checked("drive.stall_force_n", duty);
         Ok(Self {
-            effort: (effort(-EFFORT)?, effort(EFFORT + resists / rig.drive.stall_force_n)?),
+            effort: (effort(-EFFORT)?, effort(most)?),
             bent: counts(bent.max(BENT_COUNTS * count_mm))?,
             off: counts(off_reference_mm(rig))?,
             progress: counts(PROGRESS_COUNTS * count_mm)?,
