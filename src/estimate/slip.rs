@@ -187,8 +187,9 @@ mod tests {
             error in -0.2..0.2f64,
         ) {
             let got = found(at, slip, rate, noise, (error, 0.0));
-            // At most what the reference lets pass: see SLIP_SIGMA.
-            prop_assert!((got - slip).abs() < 0.15 + 0.34 * slip, "{got} of {slip}");
+            // Of a wheel that half grips all may pass that the reference does: see SLIP_SIGMA.
+            let part = if rate < 0.7 { 0.34 } else { 0.18 };
+            prop_assert!((got - slip).abs() < 0.15 + part * slip, "{got} of {slip}");
         }
 
         #[test]

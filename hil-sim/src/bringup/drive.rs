@@ -171,15 +171,15 @@ fn turns(
             [false, true] => "the encoder's line A (PA0) is missing: its level never changes",
             [true, false] => "the encoder's line B (PA1) is missing: its level never changes",
             _ => {
-                "the encoder's line A or B is missing: measure PA0 and PA1 while the wheel is \
-                 turned by hand; the one that does not change"
+                "the encoder's line A or B is missing: measure PA0 and PA1 while the wheel turns; \
+                 the one that does not change"
             }
         }
     } else if was_seen {
         "the wheel encoder is not connected: neither line changes although the wheel turns"
     } else {
-        "the wheel is blocked, or the drive motor's leads are open: turn the wheel by hand; if it \
-         is free, measure the motor's resistance at the bridge"
+        "the wheel is blocked, or the drive motor's leads are open: turn the motor by its crank; if \
+         it is free, measure the motor's resistance at the bridge"
     };
     vec![check("drive turns", false, shown, advice)]
 }
