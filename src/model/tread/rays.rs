@@ -35,16 +35,7 @@ pub(super) fn ahead(
     depth: impl Fn(&Ray) -> i32,
     mut visit: impl FnMut(i32, &Ray, i32),
 ) -> i32 {
-    let mut place = from;
-    for ray in between(from, until) {
-        let depth = depth(ray);
-        if depth <= 0 {
-            break;
-        }
-        visit(place, ray, depth);
-        place += 1;
-    }
-    place - from
+    walk(between(from, until).iter(), depth, |n, ray, depth| visit(from + n, ray, depth))
 }
 
 /// The same backwards, from before `from` down to `until`.
@@ -55,16 +46,27 @@ pub(super) fn behind(
     depth: impl Fn(&Ray) -> i32,
     mut visit: impl FnMut(i32, &Ray, i32),
 ) -> i32 {
-    let mut place = from;
-    for ray in between(until, from).iter().rev() {
+    let rays = between(until, from).iter().rev();
+    walk(rays, depth, |n, ray, depth| visit(from - 1 - n, ray, depth))
+}
+
+/// Visits rays, with their number so far, as long as the depth along them is positive.
+#[inline(always)]
+fn walk<'a>(
+    rays: impl Iterator<Item = &'a Ray>,
+    depth: impl Fn(&Ray) -> i32,
+    mut visit: impl FnMut(i32, &Ray, i32),
+) -> i32 {
+    let mut number = 0;
+    for ray in rays {
         let depth = depth(ray);
         if depth <= 0 {
             break;
         }
-        place -= 1;
-        visit(place, ray, depth);
+        visit(number, ray, depth);
+        number += 1;
     }
-    from - place
+    number
 }
 
 /// Rays of the places from `low` to before `high`, none if a place has none.
