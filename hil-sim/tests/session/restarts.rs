@@ -32,13 +32,13 @@ fn unsure(mode: Mode, count: &AtomicU64, runs: u64) -> bool {
     100 * (count.fetch_add(is.into(), Ordering::Relaxed) + u64::from(is)) <= 2 * runs && is
 }
 
-/// Checks the runs of these seeds in parallel, the interrupted one and the one after it in
-/// each direction: `check` describes a run that failed.
+/// Checks the runs of these seeds and of 126, once a false 125, the interrupted one and the one
+/// after it in each direction: `check` describes a run that failed.
 fn each_direction(seeds: u64, check: impl Fn(u64, Direction, Direction) -> Option<String> + Sync) {
     for direction in DIRECTIONS {
         for then in DIRECTIONS {
             let one = |seed| check(seed, direction, then);
-            let failed: Vec<String> = (1..=seeds).into_par_iter().filter_map(one).collect();
+            let failed: Vec<_> = (1..=seeds).into_par_iter().chain([126]).filter_map(one).collect();
             assert!(failed.is_empty(), "{direction:?}, then {then:?}: {failed:#?}");
         }
     }
