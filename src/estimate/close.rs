@@ -169,6 +169,12 @@ impl Estimator {
         let missed = missed(state, open.step, higher).filter(|_| !elsewhere);
         let misread = point.leverage * missed.unwrap_or(Ratio::ZERO);
         let shift = if retracts { shift } else { shift - misread };
+        if let Some(climb) = open.climb.filter(|climb| climb.leverage > Q16::ZERO) {
+            let leverage = climb.leverage + point.leverage;
+            let sigma = leverage * missed.unwrap_or(Ratio::ZERO).abs() * MISREAD_SIGMA;
+            let moved = climb.moved + higher * climb.slope - measured.shift;
+            state.odometry.climb(state.position, &climb.since, moved, sigma);
+        }
         if state.known.is_searching() && open.step > 0 {
             self.count_down(state, sensed, open);
             found.advanced = true;
@@ -192,12 +198,6 @@ impl Estimator {
         if missed.is_some() {
             let part = if retracts { Ratio::ONE } else { MISREAD_SIGMA };
             state.odometry.misread(state.direction, misread.abs() * part);
-        }
-        if let Some(climb) = open.climb.filter(|climb| climb.leverage > Q16::ZERO) {
-            let leverage = climb.leverage + point.leverage;
-            let sigma = leverage * missed.unwrap_or(Ratio::ZERO).abs() * MISREAD_SIGMA;
-            let moved = climb.moved + higher * climb.slope - measured.shift;
-            state.odometry.climb(state.position, &climb.since, moved, sigma);
         }
         if let Some(landing) = landing.filter(|landing| landing.slid > Q16::ZERO) {
             state.odometry.slip(Q16::ZERO, landing.sigma());

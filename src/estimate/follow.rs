@@ -330,18 +330,13 @@ impl Estimator {
         // Of a crossing that began in its middle the wall below was not measured.
         let Some(open) = state.crossing.as_mut().filter(|open| !open.turned) else { return };
         if ahead.abs() <= self.telling {
-            let lift = open.lift.filter(|_| open.corrected);
-            let climbs = lift.filter(|_| state.direction == Direction::Deploy);
+            let climbs = open.lift.filter(|_| state.direction == Direction::Deploy);
             if let Some(lift) = climbs.filter(|_| open.climb.is_none()) {
                 let moved = position + ahead - lift.face;
                 let mut climb = Climb::default();
                 if open.searched {
                     // The wheel may have begun on this corner, and lifted off elsewhere.
                     state.odometry.set_by_step(sensed.travel, state.position - moved);
-                } else if open.slip.lost > moved.abs() {
-                    // More slip than creep: what the wheel slipped in all.
-                    open.slip.beside += moved;
-                    state.odometry.slip(moved, Q16::ZERO);
                 } else {
                     let leverage = self.watch.leverage(seen.compression, ahead);
                     let slope = divide(self.watch.radius - fall, ahead.max(Millimetres::ONE));
@@ -398,6 +393,8 @@ impl Estimator {
         } else if corrects && !retracts && self.is_explained(state, open.step, residual) {
             residual = self.correct(state, sensed, (open.step, residual), found);
             open.corrected = true;
+        } else if !retracts {
+            state.odometry.leave(state.position);
         }
         // Another one is judged when the step's height is known.
         state.begin_tick(sensed.travel);

@@ -260,6 +260,12 @@ impl Odometry {
         self.refine(residual)
     }
 
+    /// The step under the wheel here may correct the position later: from here on its climb shows.
+    pub(super) fn leave(&mut self, position: Millimetres) {
+        self.covariance[0][0] += self.wander(&self.since(position));
+        self.mark = self.weights(position);
+    }
+
     /// How the states shifted the position since a step last corrected it.
     pub fn since(&self, position: Millimetres) -> [Ratio; STATES] {
         let weights = self.weights(position);
@@ -276,10 +282,14 @@ impl Odometry {
         sigma: Millimetres,
     ) {
         let parts = (sigma + EDGE).min(Millimetres::ONE) * PER_PLACE;
-        let wandered = self.wander(since);
+        let noise = parts * parts;
+        // What is beyond two sigmas makes the place as unsure as it is far.
+        let far = (moved * PER_PLACE).half();
+        let known = self.expect(since).1 + noise;
+        let wandered = self.wander(since).max(far * far - known);
         self.covariance[0][0] += wandered;
         self.mark = core::array::from_fn(|i| self.mark[i] + since[i]);
-        let gains = self.learn(since, parts * parts, wandered);
+        let gains = self.learn(since, noise, wandered);
         self.take(moved, sum(&gains, &self.weights(position)), gains);
     }
 
