@@ -18,6 +18,11 @@ impl Controller {
     pub(super) fn course(&self, state: &State, tick: &Pass<'_>, direction: Direction) -> Course {
         let (steps, estimate) = (self.estimator.steps(), &state.estimate);
         let felt = self.estimator.felt(estimate);
+        let behind = state.preload_loop.due() - tick.sensed.preload_filtered;
+        // A wheel that climbs does not rush at its corner when the preload is hardly less late.
+        let within = self.schedule.reached_within;
+        let held_back = state.approach.late && direction == Direction::Deploy;
+        let within = if held_back { within.half() } else { within };
         Course {
             direction,
             distance: felt.or_else(|| self.estimator.distance(estimate)),
@@ -30,8 +35,7 @@ impl Controller {
             acceleration: state.profile.acceleration(),
             reference: state.preload_loop.reference(tick.sensed.preload.value),
             preload: estimate.remembered_preload(),
-            preload_late: state.preload_loop.due() - tick.sensed.preload_filtered
-                > self.schedule.reached_within,
+            preload_late: behind > within,
         }
     }
 
@@ -62,6 +66,7 @@ impl Controller {
             // corner faster than any plan would.
             plan.approach.window_speed = plan.approach.window_speed.min(self.least_speed);
         }
+        state.approach.late = course.preload_late;
         let mut targets = self.schedule.targets(self.estimator.steps(), &plan, &course);
         state.approach.ramping = targets.ramping;
         state.approach.begun = targets.begun;

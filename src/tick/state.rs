@@ -63,6 +63,8 @@ pub(super) struct Approach {
     pub wait_reported: bool,
     /// Ticks for which the drive has waited for the preload.
     pub waiting: u32,
+    /// The preload is behind what the actuator's model expects.
+    pub late: bool,
 }
 
 /// The exchange with the model task.
