@@ -169,11 +169,14 @@ impl Estimator {
         let missed = missed(state, open.step, higher).filter(|_| !elsewhere);
         let misread = point.leverage * missed.unwrap_or(Ratio::ZERO);
         let shift = if retracts { shift } else { shift - misread };
-        if let Some(climb) = open.climb.filter(|climb| climb.leverage > Q16::ZERO) {
+        // Unless the height behind it and the compression on it were measured, the edge tells nothing.
+        let climb = open.climb.filter(|climb| climb.leverage > Q16::ZERO && measured.plausible);
+        if let Some((climb, missed)) = climb.zip(missed) {
             let leverage = climb.leverage + point.leverage;
-            let sigma = leverage * missed.unwrap_or(Ratio::ZERO).abs() * MISREAD_SIGMA;
+            let sigma = leverage * missed.abs() * MISREAD_SIGMA + open.slip.sigma();
             let moved = climb.moved + higher * climb.slope - measured.shift;
             state.odometry.climb(state.position, &climb.since, moved, sigma);
+            state.begin_tick(sensed.travel);
         }
         if state.known.is_searching() && open.step > 0 {
             self.count_down(state, sensed, open);

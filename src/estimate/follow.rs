@@ -393,7 +393,7 @@ impl Estimator {
         } else if corrects && !retracts && self.is_explained(state, open.step, residual) {
             residual = self.correct(state, sensed, (open.step, residual), found);
             open.corrected = true;
-        } else if !retracts {
+        } else if corrects && !retracts {
             state.odometry.leave(state.position);
         }
         // Another one is judged when the step's height is known.

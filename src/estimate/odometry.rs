@@ -260,13 +260,13 @@ impl Odometry {
         self.refine(residual)
     }
 
-    /// The step under the wheel here may correct the position later: from here on its climb shows.
+    /// The wheel leaves the wall of a step that may correct the position later: its climb begins here.
     pub(super) fn leave(&mut self, position: Millimetres) {
         self.covariance[0][0] += self.wander(&self.since(position));
         self.mark = self.weights(position);
     }
 
-    /// How the states shifted the position since a step last corrected it.
+    /// How the states shifted the position since a step last corrected it, or was left.
     pub fn since(&self, position: Millimetres) -> [Ratio; STATES] {
         let weights = self.weights(position);
         core::array::from_fn(|i| weights[i] - self.mark[i])
@@ -283,7 +283,7 @@ impl Odometry {
     ) {
         let parts = (sigma + EDGE).min(Millimetres::ONE) * PER_PLACE;
         let noise = parts * parts;
-        // What is beyond two sigmas makes the place as unsure as it is far.
+        // What is beyond two sigmas no model explains: so far has the place wandered.
         let far = (moved * PER_PLACE).half();
         let known = self.expect(since).1 + noise;
         let wandered = self.wander(since).max(far * far - known);

@@ -59,8 +59,7 @@ pub struct CornerSlip {
     noise: Millimetres,
     /// Axial slip so far, mm: travel of the tread that moved no axle, or of the axle that no tread made.
     pub lost: Millimetres,
-    /// What the tread slipped beyond it, mm: it turns across the edge, and the place of the edge in the
-    /// end shows more.
+    /// What the tread slipped beyond it, mm: it turns across the edge.
     pub beside: Millimetres,
 }
 

@@ -63,7 +63,7 @@ pub(super) struct Approach {
     pub wait_reported: bool,
     /// Ticks for which the drive has waited for the preload.
     pub waiting: u32,
-    /// The preload is behind what the actuator's model expects.
+    /// The preload was behind what the actuator's model expects, and still is by half of that.
     pub late: bool,
 }
 
