@@ -74,7 +74,8 @@ impl SpeedLoop {
     }
 
     /// Duty for `wanted` speed at `measured` speed against `load`, all signed
-    /// outwards. The integral holds while the duty saturates in the same direction.
+    /// outwards. The integral holds while the duty saturates in the same direction, and where
+    /// it would only brake harder: against a load along the motion the worm does that by itself.
     pub fn step(
         &self,
         state: &mut SpeedLoopState,
@@ -85,7 +86,9 @@ impl SpeedLoop {
         let error = wanted - measured;
         let forward = wanted * self.per_speed + self.forward(load);
         let whole = forward + self.proportional * error + state.value();
-        let pushing = if error < Q16::ZERO { whole > -FULL } else { whole < FULL };
+        let least = if wanted > Q16::ZERO { Q16::ZERO } else { -FULL };
+        let most = if wanted < Q16::ZERO { Q16::ZERO } else { FULL };
+        let pushing = if error < Q16::ZERO { whole > least } else { whole < most };
         if pushing {
             let limit = INTEGRAL_LIMIT.widen();
             state.integral = state
@@ -125,8 +128,7 @@ mod tests {
     fn settle(load: f64, wanted: f64, seconds: f64) -> f64 {
         let rig = Rig::prototype();
         let control = SpeedLoop::try_build(&rig).unwrap();
-        let mut state = SpeedLoopState::default();
-        let mut speed = 0.0;
+        let (mut state, mut speed) = (SpeedLoopState::default(), 0.0);
         for _ in 0..(seconds * 1e3) as usize {
             let out =
                 control.step(&mut state, Q16::from_num(wanted), Q16::from_num(speed), Q16::ZERO);
@@ -146,18 +148,20 @@ mod tests {
     }
 
     #[test]
-    fn the_integral_does_not_wind_up_against_a_wall() {
-        let rig = Rig::prototype();
-        let control = SpeedLoop::try_build(&rig).unwrap();
+    fn the_integral_winds_up_neither_against_a_wall_nor_to_brake() {
+        let control = SpeedLoop::try_build(&Rig::prototype()).unwrap();
+        let step = |state: &mut _, wanted, measured| {
+            control.step(state, Q16::from_num(wanted), Q16::from_num(measured), Q16::ZERO)
+        };
         let mut state = SpeedLoopState::default();
-        for _ in 0..20_000 {
-            control.step(&mut state, Q16::from_num(60), Q16::ZERO, Q16::ZERO);
-        }
+        assert!((0..20_000).all(|_| step(&mut state, 60, 0).to_bits() > 0));
         assert!(state.value() <= INTEGRAL_LIMIT);
         // Released, it comes back within a fraction of a second.
-        let (wanted, measured) = (Q16::from_num(10), Q16::from_num(30));
-        let mut falls = || control.step(&mut state, wanted, measured, Q16::ZERO);
-        assert!((0..200).any(|_| falls().to_bits() <= 0));
+        assert!((0..200).any(|_| step(&mut state, 10, 30).to_bits() <= 0));
+        for sign in [1, -1] {
+            let duties = (0..20_000).map(|_| step(&mut state, 10 * sign, 11 * sign).to_bits());
+            assert!(duties.last().unwrap().abs() < 99);
+        }
     }
 
     /// What handing a load over changes of the duty at this error, the duty of the load, and the effort
@@ -165,11 +169,9 @@ mod tests {
     fn handed(load: f64, error: f64) -> [f64; 3] {
         let control = SpeedLoop::try_build(&Rig::prototype()).unwrap();
         let mut state = SpeedLoopState::default();
-        for _ in 0..32 {
-            let (load, error) = (Q16::from_num(load), Q16::from_num(error));
-            control.hand_over(&mut state, load, q16(31_250), error);
-        }
-        let forward: f64 = control.forward(Q16::from_num(load)).to_num();
+        let (load, error) = (Q16::from_num(load), Q16::from_num(error));
+        (0..32).for_each(|_| control.hand_over(&mut state, load, q16(31_250), error));
+        let forward: f64 = control.forward(load).to_num();
         [forward + state.value().to_num::<f64>(), forward, state.effort().to_num()]
     }
 

@@ -272,8 +272,8 @@ impl Odometry {
         core::array::from_fn(|i| weights[i] - self.mark[i])
     }
 
-    /// The edge that last corrected the position seems to have moved outwards by so much, give or take
-    /// `sigma`, mm, `since` then: so far the tread gave way by more than its model has it.
+    /// The edge that the wheel climbed seems to have moved outwards by so much, give or take `sigma`,
+    /// mm, `since` the wheel left the wall: so far the tread gave way by more than its model has it.
     pub fn climb(
         &mut self,
         position: Millimetres,
