@@ -18,7 +18,7 @@ const LONGEST: u32 = 40_000;
 
 /// Rigs in each direction: 300, or a sample of them.
 fn rigs() -> u64 {
-    if long() { 300 } else { 16 }
+    if long() { 300 } else { 50 }
 }
 
 fn session(seed: u64, direction: Direction) -> Session {
