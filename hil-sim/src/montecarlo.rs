@@ -116,21 +116,27 @@ impl RunLine {
 const REPORT_END: [u16; 3] =
     [Limit::StepMissing.code(), Limit::PositionUnconfirmed.code(), Limit::EndOverrun.code()];
 
-/// Slip that is named wrong by more than this, mm, and by more than this part of it; distance from
-/// the end, mm; and gap over the reference, from which a run that names none of them is wrong in
-/// silence.
+/// Slip that is named wrong by more than this, mm, by more than this part of it and by more than two of its
+/// sigmas as stated; distance from the end, mm; and gap over the reference, from which a run that names none
+/// of them is wrong in silence.
 const UNNAMED: (f64, f64) = (0.5, 0.2);
 const END_MM: f64 = 1.0;
 const GAP: f64 = 1.1;
 
 /// Whether a run slipped, ended elsewhere or opened a gap without a word of it.
 fn is_unreported(summary: &Summary, limits: &[u16], travel_mm: f64) -> bool {
-    let off = |slip: f64, named: f64| (slip - named).abs() > UNNAMED.0.max(UNNAMED.1 * slip);
+    let off = |slip: f64, named: f64, sigma: f64| {
+        (slip - named).abs() > UNNAMED.0.max(UNNAMED.1 * slip).max(2.0 * sigma)
+    };
     let crossings = &summary.crossings;
     let crossed: f64 = crossings.iter().map(|c| c.slip_mm).sum();
     let wide = opened_wide(summary);
-    crossings.iter().any(|c| off(c.slip_mm, c.slip_measured_mm.unwrap_or(0.0)))
-        || off(summary.slip_mm - crossed, 0.0)
+    let misnamed = |c: &CrossingLine| {
+        let [named, sigma] = [c.slip_measured_mm, c.slip_sigma_mm].map(Option::unwrap_or_default);
+        off(c.slip_mm, named, sigma)
+    };
+    crossings.iter().any(misnamed)
+        || off(summary.slip_mm - crossed, 0.0, 0.0)
         || (summary.travel_mm - travel_mm).abs() > END_MM
             && !limits.contains(&Limit::EndOverrun.code())
         || wide && !limits.contains(&Limit::GapWide.code())

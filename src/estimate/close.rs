@@ -168,13 +168,17 @@ impl Estimator {
         let elsewhere = retracts && (point.residual + shift).abs() > self.steps.tolerance;
         let missed = missed(state, open.step, higher).filter(|_| !elsewhere);
         let misread = point.leverage * missed.unwrap_or(Ratio::ZERO);
-        let shift = if retracts { shift } else { shift - misread };
+        let shift = shift - misread;
         // Unless the height behind it and the compression on it were measured, the edge tells nothing.
-        let climb = open.climb.filter(|climb| climb.leverage > Q16::ZERO && measured.plausible);
+        let climb = open.climb.filter(|climb| climb.depth > Q16::ZERO && measured.plausible);
         if let Some((climb, missed)) = climb.zip(missed) {
-            let leverage = climb.leverage + point.leverage;
-            let sigma = leverage * missed.abs() * MISREAD_SIGMA + open.slip.sigma();
-            let moved = climb.moved + higher * climb.slope - measured.shift;
+            let depth = climb.depth + climb.depth * missed;
+            let ahead = self.watch.measure(depth, climb.height, measured.height).distance;
+            let moved = climb.from_face + ahead - shift;
+            // The ends of a contact are tilted: of a compression c they show less, by c / R of it.
+            let tilted = self.watch.leverage(depth, ahead) * divide(depth, self.watch.radius);
+            let misread = misread * MISREAD_SIGMA;
+            let sigma = sqrt(tilted * tilted + misread * misread) + open.slip.sigma();
             state.odometry.climb(state.position, &climb.since, moved, sigma);
             state.begin_tick(sensed.travel);
         }
@@ -199,13 +203,12 @@ impl Estimator {
             }
         };
         if missed.is_some() {
-            let part = if retracts { Ratio::ONE } else { MISREAD_SIGMA };
-            state.odometry.misread(state.direction, misread.abs() * part);
+            state.odometry.misread(state.direction, misread.abs() * MISREAD_SIGMA);
         }
         if let Some(landing) = landing.filter(|landing| landing.slid > Q16::ZERO) {
             state.odometry.slip(Q16::ZERO, landing.sigma());
-            if higher > HEIGHT_SEEN && open.slide.may_unwind(landing.slid) {
-                open.slip.lost -= landing.slid;
+            if higher > HEIGHT_SEEN {
+                open.slip.lost -= open.slide.unwound(landing.slid);
             }
         }
         if higher.abs() > HEIGHT_SEEN {
@@ -253,7 +256,7 @@ pub(super) struct Measured {
 }
 
 impl OpenCrossing {
-    /// Slip so far, of a wheel that is here, if it is more than its sigma.
+    /// Slip so far, of a wheel that is here, if it is more than one of its sigmas.
     pub(crate) fn slipped(&self, position: Millimetres) -> Option<Slip> {
         let amount = self.slip.lost + self.slip.beside;
         let sigma = self.landing.map_or(self.slip.sigma(), |landing| landing.sigma());

@@ -282,13 +282,18 @@ impl CrossingWatch {
         if self.rise(state, direction, seen) < enough {
             return None;
         }
-        let height = state.baseline.output() + self.radius - seen.radius;
+        let height = self.height(state, seen);
         Some(match direction {
             Direction::Deploy => self.measure(seen.compression, height, self.step).distance,
             Direction::Retract => {
                 -self.measure(seen.compression, height + self.step, self.step).distance
             }
         })
+    }
+
+    /// Height of the centre over the wall that the wheel came from, mm.
+    pub fn height(&self, state: &WatchState, seen: &WatchInput) -> Millimetres {
+        state.baseline.output() + self.radius - seen.radius
     }
 
     /// Distance from a face at which an undeformed wheel on this ground touches its edge, mm, over the

@@ -10,7 +10,6 @@ use super::wind_up::Pulled;
 use super::{EstimateState, Estimator, Expectation, Findings, LiftPoint, OpenCrossing, Position};
 use crate::fault::{Fault, Limit};
 use crate::model::LimitedBy;
-use crate::numeric::divide;
 use crate::sense::{FILTER_LAG, SensedState};
 use crate::units::{Direction, Millimetres, Newtons, Q16, Ratio, Tick, q16};
 
@@ -332,16 +331,16 @@ impl Estimator {
         if ahead.abs() <= self.telling {
             let climbs = open.lift.filter(|_| state.direction == Direction::Deploy);
             if let Some(lift) = climbs.filter(|_| open.climb.is_none()) {
-                let moved = position + ahead - lift.face;
                 let mut climb = Climb::default();
                 if open.searched {
                     // The wheel may have begun on this corner, and lifted off elsewhere.
+                    let moved = position + ahead - lift.face;
                     state.odometry.set_by_step(sensed.travel, state.position - moved);
                 } else {
-                    let leverage = self.watch.leverage(seen.compression, ahead);
-                    let slope = divide(self.watch.radius - fall, ahead.max(Millimetres::ONE));
+                    let height = self.watch.height(&state.watch, &seen);
                     let since = state.odometry.since(state.position);
-                    climb = Climb { moved, leverage, slope, since };
+                    let from_face = position - lift.face;
+                    climb = Climb { from_face, depth: seen.compression, height, since };
                 }
                 open.climb = Some(climb);
                 state.begin_tick(sensed.travel);

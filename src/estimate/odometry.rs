@@ -35,8 +35,13 @@ const FOUND: Ratio = q16(1_250_000);
 /// compression sensor misses.
 const ROUNDED: [Millimetres; 2] = [q16(140_000), q16(250_000)];
 const UNREAD: Millimetres = q16(220_000);
+/// Readings that agree with their sigmas, for the sigmas themselves, as many as a run over three steps
+/// has: of few, their scatter is chance.
+const AGREED: Ratio = q16(6_000_000);
 /// How far an edge seems to move under a climbing wheel, mm: two codes of the arm, as above.
 const EDGE: Millimetres = q16(90_000);
+/// Sigma beyond which an edge tells nothing, mm: ten times what a tread gives way by.
+const UNTOLD: Millimetres = q16(10_000_000);
 /// Largest correction of the travel, relative.
 const MOST_SCALE: Ratio = q16(20_000);
 /// The same of winding up and creep.
@@ -74,6 +79,10 @@ pub struct Odometry {
     gains: [Ratio; STATES],
     /// How the states shifted the position where a step last corrected it.
     mark: [Ratio; STATES],
+    /// Squares of the readings before the last step's over their variances, and how many: [`AGREED`] more.
+    scatter: [Ratio; 2],
+    /// The last step's residual over its sigma, and what a millimetre adds to that.
+    last: [Ratio; 2],
     from: Option<Start>,
 }
 
@@ -101,6 +110,8 @@ impl Default for Odometry {
             share: Ratio::ZERO,
             gains: [Ratio::ZERO; STATES],
             mark: [Ratio::ONE, Ratio::ZERO, Ratio::ZERO, Ratio::ZERO],
+            scatter: [AGREED; 2],
+            last: [Ratio::ZERO; 2],
             from: None,
         }
     }
@@ -174,7 +185,7 @@ impl Odometry {
         if !back {
             return;
         }
-        let place = self.variance(position).max(KNOWN);
+        let place = (self.variance(position) * self.disagree()).max(KNOWN);
         let Self { offset, by_edges, .. } = *self;
         self.restart(Self { offset, by_edges, origin: position, ..Self::default() });
         self.covariance[0][0] = place;
@@ -183,7 +194,19 @@ impl Odometry {
     /// One sigma of `position`, mm.
     pub fn sigma(&self, position: Millimetres) -> Millimetres {
         let (spread, edges) = (self.spread(position), self.edges * self.by_edges);
-        sqrt(spread * spread + edges * edges)
+        sqrt(spread * spread * self.disagree() + edges * edges)
+    }
+
+    /// By how much more the readings scatter than by their variances, at least 1 (Birge 1932).
+    fn disagree(&self) -> Ratio {
+        let ([squares, number], [last, _]) = (self.scatter, self.last);
+        divide(squares + last * last, number).max(Ratio::ONE)
+    }
+
+    /// Another reading with this variance, in units of [`PLACE`], beside that of the last step.
+    fn compare(&mut self, variance: Ratio) -> Ratio {
+        self.scatter[1] += Ratio::ONE;
+        divide(PER_PLACE, sqrt(variance))
     }
 
     /// The same against steps whose edges are all the same, mm.
@@ -254,6 +277,9 @@ impl Odometry {
         let wandered = self.wander(&self.since(position));
         self.covariance[0][0] += wandered + WANDERS;
         self.mark = self.weights(position);
+        let known = self.expect(&self.mark).1 + FOUND;
+        self.scatter[0] += self.last[0] * self.last[0];
+        self.last = [Ratio::ZERO, self.compare(known)];
         self.gains = self.learn(&self.mark.clone(), FOUND, Q16::ZERO);
         self.share = sum(&self.gains, &self.mark);
         self.by_edges += (Ratio::ONE - self.by_edges) * self.share;
@@ -281,12 +307,14 @@ impl Odometry {
         moved: Millimetres,
         sigma: Millimetres,
     ) {
-        let parts = (sigma + EDGE).min(Millimetres::ONE) * PER_PLACE;
+        let parts = (sigma + EDGE).min(UNTOLD) * PER_PLACE;
         let noise = parts * parts;
         // What is beyond two sigmas no model explains: so far has the place wandered.
         let far = (moved * PER_PLACE).half();
         let known = self.expect(since).1 + noise;
         let wandered = self.wander(since).max(far * far - known);
+        let off = moved * self.compare(known);
+        self.scatter[0] += off * off;
         self.covariance[0][0] += wandered;
         self.mark = core::array::from_fn(|i| self.mark[i] + since[i]);
         let gains = self.learn(since, noise, wandered);
@@ -302,6 +330,7 @@ impl Odometry {
     /// The step found last lies `shift` further out than its residual had it, mm; what is left of
     /// that.
     pub fn refine(&mut self, shift: Millimetres) -> Millimetres {
+        self.last[0] += shift * self.last[1];
         self.take(shift, self.share, self.gains)
     }
 

@@ -207,3 +207,20 @@ fn a_tread_unlike_its_model_makes_the_place_less_sure() {
         assert!((got - sigma).abs() < 0.005, "{unlike}: {got}");
     }
 }
+
+#[test]
+fn readings_that_scatter_more_than_their_sigmas_make_the_place_less_sure() {
+    let sigma = |off: i64| {
+        let (mut odometry, at) = (Odometry::default(), Q16::ZERO);
+        odometry.set(Travel::ZERO, at);
+        for (step, climb) in [(1, -1), (-1, 1)] {
+            odometry.correct(at, q16(step * off));
+            odometry.give([Q16::ONE, Q16::ZERO]);
+            let since = odometry.since(at);
+            odometry.climb(at, &since, q16(climb * off), Q16::ZERO);
+        }
+        odometry.sigma(at).to_num::<f64>()
+    };
+    let [none, some, more] = [0, 150_000, 600_000].map(sigma);
+    assert!(none == some && (1.5..4.0).contains(&(more / none)), "{none} {some} {more}");
+}

@@ -148,13 +148,13 @@ pub struct LiftPoint {
 /// An edge under a climbing wheel.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Climb {
-    /// How far outwards it seems to have moved since the lift-off, mm.
-    pub moved: Millimetres,
-    /// As [`LiftPoint::leverage`].
-    pub leverage: Millimetres,
-    /// By how much it lies further out per height of the step.
-    pub slope: Ratio,
-    /// What shifted the position since then.
+    /// Position of the wheel from the edge as its lift-off showed that, mm.
+    pub from_face: Millimetres,
+    /// Its compression, and the height of its centre over the lower wall, mm.
+    pub depth: Millimetres,
+    /// See `depth`.
+    pub height: Millimetres,
+    /// What shifted the position since the lift-off.
     pub since: [Ratio; 4],
 }
 

@@ -244,6 +244,7 @@ mod tests {
             gap_measured: most,
             height: most,
             slip: most,
+            slip_sigma: most,
             lead_time: most,
             slip_margin: most,
             stiffness_scale: most,

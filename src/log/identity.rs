@@ -8,8 +8,8 @@ use crate::tick::Telemetry;
 use crate::units::Millimetres;
 
 /// Number of the frames' layout beside the names of sensors and quantities, changed with it.
-/// Today's names have schema 8.
-const LAYOUT: u16 = 0x79B9;
+/// Today's names have schema 9.
+const LAYOUT: u16 = 0x79B8;
 
 /// Layout of the frames: a hash of the names in it (FNV-1a, folded). A reader of another number
 /// reports that and decodes nothing.

@@ -106,11 +106,10 @@ pub(super) mod tests {
             gap_predicted: q(2.57),
             gap_measured: q(2.59),
             height: q(4.0),
-            slip: Q16::ZERO,
             lead_time: q(0.3),
             slip_margin: q(0.4),
             stiffness_scale: q(scale),
-            limited_by: None,
+            ..CrossingRecord::default()
         }
     }
 

@@ -68,8 +68,10 @@ pub struct CrossingRecord {
     pub gap_measured: Millimetres,
     /// Height of the step as measured, mm; that of the table if the wall behind it was not.
     pub height: Millimetres,
-    /// Slip measured on the corner, mm.
+    /// Slip measured on the corner, mm; 0 if it is within one sigma of none.
     pub slip: Millimetres,
+    /// One sigma of it, mm.
+    pub slip_sigma: Millimetres,
     /// Time for which the wanted preload was reached before the corner touched, s; negative when
     /// it was late.
     pub lead_time: Seconds,

@@ -127,6 +127,7 @@ impl Controller {
 /// Reports a crossing with the model's review.
 fn record(tick: &mut Pass<'_>, open: &OpenCrossing, outcome: &Outcome) {
     let Some(point) = open.lift else { return };
+    let slip = open.slipped(Q16::ZERO);
     tick.log(Event::Crossing(CrossingRecord {
         index: open.step,
         direction: open.direction,
@@ -139,7 +140,8 @@ fn record(tick: &mut Pass<'_>, open: &OpenCrossing, outcome: &Outcome) {
         gap_predicted: outcome.gap_predicted,
         gap_measured: open.gap,
         height: open.height,
-        slip: open.slipped(Q16::ZERO).map_or(Q16::ZERO, |slip| slip.amount),
+        slip: slip.map_or(Q16::ZERO, |slip| slip.amount),
+        slip_sigma: slip.map_or(Q16::ZERO, |slip| slip.sigma),
         lead_time: lead_time(open, point.at),
         slip_margin: outcome.slip_margin,
         stiffness_scale: outcome.learned.scale,

@@ -202,6 +202,7 @@ fn crossing_line(crossing: &Crossing, reported: &[(f64, CrossingRecord)]) -> Cro
         lead_time_s: num(|r| r.lead_time),
         slip_mm: crossing.slip_mm,
         slip_measured_mm: num(|r| r.slip),
+        slip_sigma_mm: num(|r| r.slip_sigma),
         height_measured_mm: num(|r| r.height),
         touch_s: crossing.touch_s,
         lift_s: crossing.lift_s,

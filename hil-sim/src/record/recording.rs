@@ -235,6 +235,7 @@ fn crossing(run: &Run, line: &Line) -> CrossingLine {
         // Creep and the tolerances of the steps are part of it.
         slip_mm: seen.slip_mm,
         slip_measured_mm: seen.slip_measured_mm,
+        slip_sigma_mm: seen.slip_sigma_mm,
         height_measured_mm: seen.height_measured_mm,
         touch_s: touch.map_or(seen.t_s, |row| row.t_s),
         lift_s: lift.or(span.last()).map_or(seen.t_s, |row| row.t_s),

@@ -32,6 +32,9 @@ pub struct CrossingLine {
     /// Slip on the corner that the controller measured, mm.
     #[serde(default)]
     pub slip_measured_mm: Option<f64>,
+    /// One sigma of it, mm.
+    #[serde(default)]
+    pub slip_sigma_mm: Option<f64>,
     /// Height of the step that the controller measured, mm.
     #[serde(default)]
     pub height_measured_mm: Option<f64>,
@@ -227,6 +230,9 @@ pub struct LedgerLine {
     pub slip_mm: f64,
     #[serde(default)]
     pub slip_measured_mm: Option<f64>,
+    /// One sigma of it, mm.
+    #[serde(default)]
+    pub slip_sigma_mm: Option<f64>,
     /// Measured height of the step, mm.
     #[serde(default)]
     pub height_measured_mm: Option<f64>,
@@ -262,6 +268,7 @@ impl From<&Line> for LedgerLine {
             slip_margin: num(crossing.slip_margin),
             slip_mm: num(line.slip),
             slip_measured_mm: Some(num(crossing.slip)),
+            slip_sigma_mm: Some(num(crossing.slip_sigma)),
             height_measured_mm: Some(num(crossing.height)),
             stiffness_scale: num(crossing.stiffness_scale),
             trend: num(line.trend),

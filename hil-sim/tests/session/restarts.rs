@@ -18,7 +18,7 @@ const LONGEST: u32 = 40_000;
 
 /// Rigs in each direction: 300, or a sample of them.
 fn rigs() -> u64 {
-    if long() { 300 } else { 16 }
+    if long() { 300 } else { 50 }
 }
 
 fn session(seed: u64, direction: Direction) -> Session {
@@ -153,7 +153,8 @@ fn untrue(limit: &Limit) -> bool {
 #[test]
 fn a_reset_anywhere_is_followed_by_no_false_alarm() {
     for direction in DIRECTIONS {
-        let ends: Vec<_> = (1..=rigs())
+        // Of fewer than 300, twice in a hundred is chance.
+        let ends: Vec<_> = (1..=300)
             .into_par_iter()
             .map(|seed| {
                 let after = 1200 + (seed * 7919 % 3500) as u32;
@@ -164,11 +165,11 @@ fn a_reset_anywhere_is_followed_by_no_false_alarm() {
         let count = AtomicU64::default();
         let honest = |mode: Mode| {
             matches!(mode, Mode::Complete(_) | Mode::FaultHold(Fault::PositionUnknown) | Mode::Idle)
-                || unsure(mode, &count, rigs())
+                || unsure(mode, &count, 300)
         };
         let alarms: Vec<_> = ends.iter().filter(|(_, mode)| !honest(*mode)).collect();
         let arrived = ends.iter().filter(|(_, mode)| matches!(mode, Mode::Complete(_))).count();
-        assert!(4 * arrived as u64 > rigs(), "{direction:?}: {arrived}");
+        assert!(4 * arrived > 300, "{direction:?}: {arrived}");
         assert!(alarms.is_empty(), "{direction:?}: {}: {alarms:?}", alarms.len());
     }
 }
@@ -195,8 +196,8 @@ fn with_its_record_it_arrives_in_either_direction_from_anywhere() {
         let from = if direction == Direction::Deploy { 2000 } else { 2800 };
         let after = from + (seed * 7919 % 5000) as u32;
         let end = resumed(seed, direction, after, true, then);
-        let arrived = matches!(end.1, Mode::Complete(_));
-        (!arrived).then(|| format!("seed {seed}, after {after} ticks: {end:?}"))
+        (!matches!(end.1, Mode::Complete(_)))
+            .then(|| format!("seed {seed}, after {after}: {end:?}"))
     });
 }
 
@@ -311,10 +312,8 @@ fn assert_returns(session: &mut Session, name: &str) -> Vec<Limit> {
 
 #[test]
 fn moved_on_the_last_wall_it_reports_that_and_finds_its_position_on_retraction() {
-    for (seed, moved) in (1..=rigs().min(20))
-        .step_by(if long() { 1 } else { 8 })
-        .flat_map(|seed| MOVED.map(|moved| (seed, moved)))
-    {
+    let step = if long() { 1 } else { 8 };
+    for (seed, moved) in (1..=20).step_by(step).flat_map(|seed| MOVED.map(|moved| (seed, moved))) {
         for out in [0, 1500, LONGEST] {
             let (mut session, limits) = moved_on_the_last_wall(seed, moved, out);
             let name = format!("{seed} {moved} {out}");

@@ -36,7 +36,7 @@ impl CrossingWatch {
 
     /// What a lift-off shows with this depth at the corner and the centre this high above the
     /// lower wall, for a step of height h, mm: `y^2 - (y-h)^2 = h (2y - h)`.
-    pub(super) fn measure(
+    pub(in crate::estimate) fn measure(
         &self,
         depth: Millimetres,
         height: Millimetres,
