@@ -123,9 +123,13 @@ impl Estimator {
         // Too far for an edge, on a step that is not as high as the table has it.
         let most = self.corner().first_contact(Direction::Deploy);
         let beyond = ahead.is_some_and(|ahead| ahead > most) && !on_corner;
-        let ahead = ahead.filter(|_| !beyond).map_or(Q16::MIN, |ahead| ahead.min(most));
-        let drops = on_corner && state.direction == Direction::Retract;
-        let over = state.watch.contact == Contact::Leaving && ahead <= Q16::ZERO;
+        // A retracting wheel that leaves its edge is on the lower wall, wherever its table has that.
+        let retracts = state.direction == Direction::Retract;
+        let leaves = state.watch.contact == Contact::Leaving;
+        let off = beyond || retracts && leaves;
+        let ahead = ahead.filter(|_| !off).map_or(Q16::MIN, |ahead| ahead.min(most));
+        let drops = on_corner && retracts;
+        let over = leaves && ahead <= Q16::ZERO;
         let floor = if beyond || over {
             seen.compression
         } else {
