@@ -35,8 +35,8 @@ const FOUND: Ratio = q16(1_250_000);
 /// compression sensor misses.
 const ROUNDED: [Millimetres; 2] = [q16(140_000), q16(250_000)];
 const UNREAD: Millimetres = q16(220_000);
-/// Readings that agree with their sigmas, for the sigmas themselves, as many as a run over three steps
-/// has: of few, their scatter is chance.
+/// Number of readings that count as scattering by their sigmas before the first: as many as a run over
+/// three steps has. The scatter of few is chance.
 const AGREED: Ratio = q16(6_000_000);
 /// How far an edge seems to move under a climbing wheel, mm: two codes of the arm, as above.
 const EDGE: Millimetres = q16(90_000);
@@ -203,7 +203,7 @@ impl Odometry {
         divide(squares + last * last, number).max(Ratio::ONE)
     }
 
-    /// Another reading with this variance, in units of [`PLACE`], beside that of the last step.
+    /// Counts a reading of this variance, in units of [`PLACE`]; how many sigmas a millimetre of it is.
     fn compare(&mut self, variance: Ratio) -> Ratio {
         self.scatter[1] += Ratio::ONE;
         divide(PER_PLACE, sqrt(variance))

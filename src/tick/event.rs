@@ -70,7 +70,7 @@ pub struct CrossingRecord {
     pub height: Millimetres,
     /// Slip measured on the corner, mm; 0 if it is within one sigma of none.
     pub slip: Millimetres,
-    /// One sigma of it, mm.
+    /// One sigma of a slip that is named, mm; 0 of none: a smaller one is not excluded.
     pub slip_sigma: Millimetres,
     /// Time for which the wanted preload was reached before the corner touched, s; negative when
     /// it was late.
