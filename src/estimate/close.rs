@@ -1,5 +1,6 @@
 //! Closes a crossing: its step corrects the position, and it is reported for review.
 
+use super::crossing::Measured;
 use super::landing::Landing;
 use super::{EstimateState, Estimator, Findings, LiftPoint, OpenCrossing, Position, Slip};
 use crate::fault::{Fault, Limit};
@@ -244,15 +245,6 @@ fn missed(state: &EstimateState, step: u8, higher: Millimetres) -> Option<Ratio>
     let fall = fall + higher;
     let part = divide(fall - compression, fall.max(compression).max(Q16::DELTA));
     (step > 0 && over == step).then_some(part)
-}
-
-/// What the wall behind a step shows of the crossing.
-pub(super) struct Measured {
-    pub(super) height: Millimetres,
-    pub(super) gap: Millimetres,
-    pub(super) gap_as_table: Millimetres,
-    pub(super) shift: Millimetres,
-    pub(super) plausible: bool,
 }
 
 impl OpenCrossing {

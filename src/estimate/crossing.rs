@@ -110,6 +110,21 @@ pub struct Lift {
     pub distance: Millimetres,
 }
 
+/// What the wall behind a step shows of the crossing, mm.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Measured {
+    /// Step height; the nominal one if what is measured is not plausible.
+    pub height: Millimetres,
+    /// Gap with that height.
+    pub gap: Millimetres,
+    /// Gap of a wheel as deep in the corner at the nominal height.
+    pub gap_as_table: Millimetres,
+    /// By how much that height changes the distance to the face at the lift.
+    pub shift: Millimetres,
+    /// The measured height lies within [`HEIGHT_MOST`] of the table.
+    pub plausible: bool,
+}
+
 /// What the watch noticed in a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum CrossingEvent {
@@ -121,19 +136,8 @@ pub enum CrossingEvent {
     Lifted(Lift),
     /// The wheel has left the corner for the next wall.
     Passed,
-    /// The next wall's baseline is known: step height and the gap with it, mm.
-    GapClosed {
-        /// Measured step height; the nominal one if that is not plausible.
-        height: Millimetres,
-        /// Gap with that height.
-        gap: Millimetres,
-        /// Gap of a wheel as deep in the corner at the nominal height.
-        gap_as_table: Millimetres,
-        /// By how much that height changes the distance to the face at the lift.
-        shift: Millimetres,
-        /// The measured height lies within [`HEIGHT_MOST`] of the table.
-        plausible: bool,
-    },
+    /// The next wall's baseline is known.
+    GapClosed(Measured),
     /// The next corner carries before the wall between was measured; the gap of the
     /// last one with the nominal height, mm.
     Retouched {
@@ -477,7 +481,8 @@ impl CrossingWatch {
         state.baseline = state.next;
         state.contact = Contact::Wall;
         state.ticks = 0;
-        Some(CrossingEvent::GapClosed { height, gap, gap_as_table, shift, plausible })
+        let measured = Measured { height, gap, gap_as_table, shift, plausible };
+        Some(CrossingEvent::GapClosed(measured))
     }
 
     /// A corner begins to carry.

@@ -1,6 +1,5 @@
 //! Follows a crossing: what the watch detects becomes odometry, level and review.
 
-use super::close::Measured;
 use super::crossing::{Contact, CrossingEvent, Lift, WatchInput};
 use super::landing::OnEdge;
 use super::odometry::Rolling;
@@ -81,8 +80,7 @@ impl Estimator {
             Some(CrossingEvent::Released) => state.crossing = None,
             Some(CrossingEvent::Lifted(lift)) => self.lifted(state, tick, lift, &mut found),
             Some(CrossingEvent::Passed) => state.pass(),
-            Some(CrossingEvent::GapClosed { height, gap, gap_as_table, shift, plausible }) => {
-                let measured = Measured { height, gap, gap_as_table, shift, plausible };
+            Some(CrossingEvent::GapClosed(measured)) => {
                 self.close(state, tick.sensed, &measured, &mut found);
             }
             Some(CrossingEvent::Retouched { gap_as_table }) => {

@@ -1,8 +1,8 @@
 //! Following a crossing: steps found, missed and displaced.
 
-use super::super::close::report_displaced;
 use super::super::landing::Landing;
 use super::super::restore::tests::{estimator, sensed};
+use super::super::{close::report_displaced, crossing::Measured};
 use super::*;
 use crate::units::{Travel, q16};
 

@@ -148,7 +148,7 @@ impl Pulls {
     /// Length of the contact, mm: with the wall above an edge, and with the wall below, which bears this part
     /// of the load. On a wall its trailing end lets go early; at an edge that the tread leaves it is cut off.
     /// The lower wall `presses` that end as by so much compression, the leading one by all of the floor's.
-    /// Inwards it counts with the face, where a ray of the undeformed radius meets that.
+    /// Inwards it is less than a row of elements', which the face meets, too, and more than a bonded layer's.
     fn contact(
         &self,
         pulled: &Pulled,
@@ -162,11 +162,9 @@ impl Pulls {
             let trails = to(presses.min(pulled.floor)) * (CONTACT + CONTACT - Ratio::ONE);
             return (half - ahead).min((half + half) * CONTACT) + bears(to(pulled.floor) + trails);
         }
-        let face = divide(ahead.max(Q16::ZERO) * pulled.depth, self.radius - pulled.depth);
         // What an edge has lost is on a wall, wherever its table has that.
         let met = if pulled.lost > Q16::ZERO { pulled.depth * below } else { Q16::ZERO };
-        let wall = to(pulled.floor.max(met));
-        (half - ahead + face + bears(wall + wall * below)) * CONTACT
+        (half - ahead + bears(to(pulled.floor.max(met)))) * CONTACT
     }
 }
 

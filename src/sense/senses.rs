@@ -136,7 +136,7 @@ impl Senses {
 
 impl SensedState {
     /// Validity of wheel encoder, preload sensor, compression sensor and arm angle.
-    pub const fn validities(&self) -> [Validity; 4] {
+    pub const fn validities(&self) -> [Validity; SensorId::COUNT] {
         let Self { speed, preload, compression, radius, .. } = self;
         [speed.validity, preload.validity, compression.validity, radius.validity]
     }

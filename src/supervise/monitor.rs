@@ -7,7 +7,7 @@ use crate::control::preload_loop::answer_s;
 use crate::fault::Fault;
 use crate::numeric::{LowPass, LowPassState, checked};
 use crate::rig::{OVERPRESSURE_PART, Rig, RigError};
-use crate::sense::raw::BridgeCodes;
+use crate::sense::raw::{BridgeCodes, SensorId};
 use crate::sense::{Reason, SensedState, Validity};
 use crate::units::{
     Millimetres, MillimetresPerSecond, Newtons, Q16, Ratio, TICK_HZ, Tick, Travel, q16,
@@ -173,7 +173,7 @@ impl Monitor {
 /// The fault of a sensor that cannot be used; whether one that is out of range has another one than
 /// one that is silent.
 pub(super) fn sensor_fault(sensed: &SensedState, ranged: bool) -> Option<Fault> {
-    let faults = [
+    let faults: [_; SensorId::COUNT] = [
         (Fault::WheelEncoderStale, Fault::WheelEncoderStale),
         (Fault::PreloadSensorStale, Fault::PreloadSensorRange),
         (Fault::CompressionSensorStale, Fault::CompressionSensorRange),

@@ -166,13 +166,13 @@ mod tests {
                         let within = if back { 1.1e-2 } else { 1e-3 };
                         prop_assert!(!told || off < within, "{off}");
                     }
-                    CrossingEvent::GapClosed { height: h, gap, shift, plausible, .. } => {
+                    CrossingEvent::GapClosed(seen) => {
                         let far = |h: f64| ((25.0 - depth).powi(2) - (y - h).powi(2)).sqrt();
                         let moved = if back { 0.0 } else { far(height) - far(4.0) };
-                        prop_assert!((shift.to_num::<f64>() - moved).abs() < 0.03, "{shift} {moved}");
-                        prop_assert!(plausible);
-                        prop_assert!((h.to_num::<f64>() - height).abs() < 0.02);
-                        prop_assert!((gap.to_num::<f64>() - exact).abs() < 0.02, "{gap} {exact}");
+                        let off = |got: Q16, want: f64| (got.to_num::<f64>() - want).abs();
+                        prop_assert!(off(seen.shift, moved) < 0.03, "{seen:?} {moved}");
+                        prop_assert!(seen.plausible && off(seen.height, height) < 0.02);
+                        prop_assert!(off(seen.gap, exact) < 0.02, "{seen:?} {exact}");
                     }
                     _ => {}
                 }
@@ -314,7 +314,7 @@ mod tests {
             let travel = Travel::from_num(at);
             let now = WatchInput { travel, near: true, clear: None, ..seen(ground, 0.0) };
             match watch.step(&mut state, Direction::Deploy, &now) {
-                Some(CrossingEvent::GapClosed { .. }) => measured = Some(at),
+                Some(CrossingEvent::GapClosed(_)) => measured = Some(at),
                 Some(CrossingEvent::Touched) => break,
                 _ => {}
             }
