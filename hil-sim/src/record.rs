@@ -37,4 +37,4 @@ pub use tick::{Controller, MODE_NAMES, Tick, TrueState};
 pub(crate) use tick::{STAGE_NAMES, mode_number, mode_words, stage_name};
 pub(crate) use time_lost::TimeLost;
 pub(crate) use view::{View, shown};
-pub use write::{WriteError, Writer, write_all, write_csv};
+pub use write::{WriteError, Writer, write_all};

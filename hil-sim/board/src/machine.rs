@@ -298,11 +298,6 @@ impl Machine {
         Ok(false)
     }
 
-    /// Continues after the breakpoint instruction at which the core stopped.
-    pub fn step_over_breakpoint(&mut self) {
-        self.pc += 2;
-    }
-
     /// Does everything of the chip that is due.
     fn advance_chip(&mut self) -> Result<(), CoreError> {
         let now = self.now();

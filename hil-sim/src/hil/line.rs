@@ -24,7 +24,7 @@ impl<'a> HostLine<'a> {
     /// Resets the board and waits until it is ready for its first tick.
     pub fn begin(port: &'a mut dyn Port) -> Result<Self, HilError> {
         port.reset()?;
-        let mut line = Self { port, gatherer: FrameReader::new() };
+        let mut line = Self::begin_at(port);
         match line.ask(&ToBoard::Hello { protocol: PROTOCOL }, |_| true)? {
             Some(ToHost::Next { tick: FIRST, alone: false }) => Ok(line),
             Some(ToHost::Next { tick, .. }) => Err(HilError::Apart { board: tick, host: FIRST }),

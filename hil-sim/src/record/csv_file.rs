@@ -98,7 +98,8 @@ mod tests {
     use documented::DocumentedFields as _;
 
     use super::*;
-    use crate::record::{Controller, write_csv};
+    use crate::record::Controller;
+    use crate::record::write::write_csv;
     use crate::report::example;
 
     #[test]

@@ -31,7 +31,7 @@ pub struct WriteError {
 }
 
 /// Writes the rows of `recording` to `path`, below the names of the columns.
-pub fn write_csv(recording: &Recording, path: &Path) -> Result<(), FileError> {
+pub(super) fn write_csv(recording: &Recording, path: &Path) -> Result<(), FileError> {
     atomic_write(path, |out| {
         let mut csv = csv::Writer::from_writer(out);
         for tick in &recording.rows {

@@ -6,8 +6,6 @@ use crate::description::{IWDG, bits, iwdg::*};
 
 /// Nominal frequency of its oscillator, Hz.
 pub const LSI_HZ: u64 = 32_000;
-/// The chip's own, over temperature and supply, Hz. Source: DS12288, LSI characteristics.
-pub const LSI_RANGE_HZ: [u64; 2] = [29_500, 34_000];
 
 /// Periods of its oscillator after which a written prescaler or reload value acts.
 const UPDATE: u64 = 5;
