@@ -59,4 +59,4 @@ pub(crate) const OUTCOMES: [Colour; 3] = ["#b9e3c3", "#fce3a6", "#f4b8b8"];
 pub const RANGE: Colour = "#fbe9d2";
 
 /// Colours of several of one kind, in their order.
-pub const SERIES: [Colour; 7] = [TRUTH, SPEED, PRELOAD, RADIUS, GAP, COMPRESSION, SLIP];
+pub(crate) const SERIES: [Colour; 7] = [TRUTH, SPEED, PRELOAD, RADIUS, GAP, COMPRESSION, SLIP];

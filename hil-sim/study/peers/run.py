@@ -1,4 +1,5 @@
-"""One crossing by SciPy's solvers and by MuJoCo, beside the plant's ring: writes results.json.
+"""One crossing by SciPy's solvers and by MuJoCo, beside the plant's ring: writes results.json, their
+table in docs/PLANT.md and their figure docs/figures/peers.svg.
 
 In a virtual environment with requirements.txt: `python run.py [FOLDER]`, where FOLDER takes the
 compiled equations. `problem.json` has the crossing and the ring's own figures: its settings with
@@ -15,7 +16,10 @@ import subprocess
 import sys
 import tempfile
 
+import matplotlib.figure
+
 HERE = pathlib.Path(__file__).parent
+DOCS = HERE.parents[2] / "docs"
 # Neighbouring element counts are one setting: where the elements lie at lift-off shifts the gap by
 # about a third of their pitch.
 ELEMENTS = [240, 480, 960, 1920]
@@ -60,6 +64,48 @@ def least(settings):
     return [[name, min(times, default=None)] for name, times in found.items()]
 
 
+def table(result):
+    """Least time of each method, and how many times that of the ring, the first, it is."""
+    ring = result["least_seconds"][0][1]
+    head = f"{'method':14}{f'ms within {100 * LEVEL} %':>18}{'over the ring':>16}"
+    rows = [
+        f"{name:14}{1e3 * least:18.2f}{least / ring:16.1f}" if least
+        else f"{name:14}{'never':>18}{'never':>16}"
+        for name, least in result["least_seconds"]
+    ]
+    return "\n".join([head, "-" * len(head), *rows])
+
+
+def figure(result, path):
+    """Error against time: settings that no other of their method beats in both."""
+    matplotlib.rcParams.update({"svg.fonttype": "none", "svg.hashsalt": "peers"})
+    plot = matplotlib.figure.Figure(figsize=(6.4, 3.8), layout="constrained")
+    axes = plot.subplots()
+    for name, _ in result["least_seconds"]:
+        points = []
+        for setting in sorted(result["settings"], key=lambda setting: setting["seconds"]):
+            error = setting["name"] == name and setting["error"]
+            if error and (not points or error < points[-1][1]):
+                points.append((1e3 * setting["seconds"], error))
+        if points:
+            axes.loglog(*zip(*points), "o-", label=name)
+    axes.set(title="One crossing (5 mm/s, 100 N)", xlabel="time, ms")
+    axes.set_ylabel("relative error of gap or force")
+    axes.grid(color="#e9ebef")
+    axes.minorticks_off()
+    axes.legend()
+    plot.savefig(path, metadata={"Date": None})
+
+
+def write_docs(result):
+    figure(result, DOCS / "figures/peers.svg")
+    page = (DOCS / "PLANT.md").read_text()
+    before, rest = page.split("<!-- peers -->\n")
+    after = rest.split("<!-- end -->", 1)[1]
+    block = f"<!-- peers -->\n```text\n{table(result)}\n```\n<!-- end -->"
+    (DOCS / "PLANT.md").write_text(before + block + after)
+
+
 def main():
     problem = json.loads((HERE / "problem.json").read_text())
     folder = sys.argv[1] if len(sys.argv) > 1 else tempfile.mkdtemp()
@@ -76,6 +122,8 @@ def main():
     # A setting a line.
     text = re.sub(r"\{\s+([^{}\[\]]*?)\s+\}", lambda m: "{" + re.sub(r"\s+", " ", m[1]) + "}", text)
     (HERE / "results.json").write_text(text + "\n")
+    write_docs(result)
 
 
-main()
+if __name__ == "__main__":
+    main()

@@ -3,7 +3,6 @@
 
 pub mod bench;
 pub mod cli;
-pub mod figure;
-pub mod figure_svg;
+mod figure;
 pub mod paper;
-pub mod reference;
+mod reference;

@@ -7,24 +7,24 @@
 //! is fitted but the three numbers of the tread, and nothing is tuned so that a claim
 //! would hold. Everything is deterministic: the same build writes the same bytes.
 
-pub mod amplitudes;
-pub mod case;
-pub mod cases;
-pub mod claims;
-pub mod experiment;
+mod amplitudes;
+mod case;
+mod cases;
+mod claims;
+mod experiment;
 mod finite_elements;
-pub mod histories;
-pub mod history;
-pub mod hold;
-pub mod means;
-pub mod measure;
-pub mod modes;
-pub mod page;
-pub mod published;
-pub mod simulation;
-pub mod sweeps;
-pub mod theory;
-pub mod transitions;
+mod histories;
+mod history;
+mod hold;
+mod means;
+mod measure;
+mod modes;
+pub(crate) mod page;
+mod published;
+mod simulation;
+mod sweeps;
+mod theory;
+mod transitions;
 
 use anyhow::Result;
 use rayon::prelude::*;
@@ -43,8 +43,8 @@ use sweeps::{Sweep, Variable};
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Study {
     /// The figures, in the study's order.
-    pub figures: Vec<Figure>,
-    pub claims: Vec<Claim>,
+    pub(crate) figures: Vec<Figure>,
+    pub(crate) claims: Vec<Claim>,
 }
 
 /// Deployments that [`regenerate`] runs.
@@ -99,16 +99,15 @@ pub fn regenerate(done: &(dyn Fn() + Sync)) -> Result<Study> {
         transitions::figure(at_rig),
         hold.figure(),
     ];
-    let claims = [
-        cases::claims(at_study),
-        amplitudes::claims(&amplitudes, at_study),
-        modes::claims(&modes),
-        sweeps::claims(&preload, &speed, &experiments),
-        transitions::claims(at_rig),
-        hold::claims(&hold, &experiments, &speed.gap),
+    let verdicts = [
+        cases::verdicts(at_study),
+        amplitudes::verdicts(&amplitudes, at_study),
+        modes::verdicts(&modes),
+        sweeps::verdicts(&preload, &speed, &experiments),
+        transitions::verdicts(at_rig),
+        hold::verdicts(&hold, &experiments, &speed.gap),
     ];
-    let claims = claims.concat();
-    Ok(Study { figures, claims })
+    Ok(Study { figures, claims: claims::Said::read()?.judged(&verdicts.concat())? })
 }
 
 /// The study's figures and claims as JSON, values to four figures: what a comparison

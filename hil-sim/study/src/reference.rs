@@ -7,12 +7,12 @@
 //! A [`ReferenceCase`] describes a crossing. Only the three numbers of the tread that
 //! `interstage::rig` names as fitted are fitted.
 
-pub mod beam;
+pub(crate) mod beam;
 mod case;
-pub mod collision;
-pub mod impact;
-pub mod rubber;
-pub mod vibration;
+pub(crate) mod collision;
+pub(crate) mod impact;
+pub(crate) mod rubber;
+pub(crate) mod vibration;
 
-pub use case::ReferenceCase;
-pub use rubber::Rubber;
+pub(crate) use case::ReferenceCase;
+pub(crate) use rubber::Rubber;

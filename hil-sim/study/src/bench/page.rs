@@ -4,25 +4,21 @@ use std::path::Path;
 use std::{fs, io};
 
 use hil_sim::plant::precision::Point;
+use hil_sim::report::axis::{Scale, extent, padded};
+use hil_sim::report::palette;
+use hil_sim::report::panel::{Line, Look, Panel, sheet};
 use hil_sim::table::{number, plain};
 
 use super::Report;
-use super::peers::{LEVEL, Peers, RING};
-use crate::figure::{Chart, Figure, Series};
-use crate::figure_svg::svg;
 
 /// The pages in the folder `docs` with these tables, and the plots: names below it, and texts.
-pub fn files(report: &Report, docs: &Path) -> io::Result<Vec<(&'static str, String)>> {
-    let performance = vec![plant_panel(report)];
-    let peers = vec![peers_panel(&report.peers)];
+pub(crate) fn files(report: &Report, docs: &Path) -> io::Result<Vec<(&'static str, String)>> {
     let model = fs::read_to_string(docs.join("EMULATION.md"))?;
     let plant = fs::read_to_string(docs.join("PLANT.md"))?;
-    let plant = filled(&plant, "plant", &plant_table(report))?;
     Ok(vec![
         ("EMULATION.md", filled(&model, "model", &rollout_table(report))?),
-        ("PLANT.md", filled(&plant, "solvers", &peers_table(&report.peers))?),
-        ("figures/performance.svg", svg(&figure("performance", 1, performance))),
-        ("figures/peers.svg", svg(&figure("peers", 1, peers))),
+        ("PLANT.md", filled(&plant, "plant", &plant_table(report))?),
+        ("figures/performance.svg", sheet(vec![plant_panel(report)], 1, true)),
     ])
 }
 
@@ -36,51 +32,38 @@ fn filled(page: &str, name: &str, table: &str) -> io::Result<String> {
     parts.ok_or_else(|| io::Error::other(format!("no place for the table `{name}` in its page")))
 }
 
-fn figure(id: &'static str, columns: usize, panels: Vec<Chart>) -> Figure {
-    Figure::new(id, "", String::new(), columns, panels)
-}
-
-fn plant_panel(report: &Report) -> Chart {
+fn plant_panel(report: &Report) -> Panel {
     // At the default's ratio of elements and stride.
     let usual = report.plant.default;
     let product = usual.elements as f64 * usual.stride_mm;
-    let of = |error: fn(&Point) -> f64| {
-        let line = report.plant.settings.iter();
-        let line = line
-            .filter(|point| (point.elements as f64 * point.stride_mm / product - 1.0).abs() < 1e-9);
-        line.map(|point| (1e-6 * point.wall_ns, error(point))).collect()
+    let is_similar =
+        |one: &&Point| (one.elements as f64 * one.stride_mm / product - 1.0).abs() < 1e-9;
+    let settings = report.plant.settings.iter().filter(is_similar);
+    let line = |name: &str, colour, error: fn(&Point) -> f64| {
+        let at = |one: &Point| ((1e-6 * one.wall_ns).log10(), error(one).log10());
+        let (name, look) = (name.to_owned(), Look::Measured(colour));
+        Line { name, look, points: settings.clone().map(at).collect() }
     };
-    let series = vec![
-        Series::method(4, "gap", of(|point| point.gap_error)),
-        Series::method(0, "force", of(|point| point.force_error)),
+    let lines = vec![
+        line("gap", palette::GAP, |point| point.gap_error),
+        line("force", palette::PRELOAD, |point| point.force_error),
     ];
-    let (title, x) = ("Plant: worst of twelve crossings", "time of a crossing, ms");
-    Chart::new(title, x, "relative error", series).logarithmic()
-}
-
-fn peers_panel(peers: &Peers) -> Chart {
-    let series = peers.least_seconds.iter().enumerate().map(|(index, (name, _))| {
-        let of = peers.settings.iter().filter(|setting| setting.name == *name);
-        let mut points: Vec<(f64, f64)> =
-            of.filter_map(|s| Some((1e3 * s.seconds, s.error?))).collect();
-        points.sort_by(|a, b| a.0.total_cmp(&b.0));
-        // Settings that no other of the method beats in both.
-        let mut least = f64::INFINITY;
-        points.retain(|&(_, error)| {
-            let better = error < least;
-            least = least.min(error);
-            better
-        });
-        Series::method(index, name, points)
-    });
-    let (title, y) = ("One crossing (5 mm/s, 100 N)", "relative error of gap or force");
-    Chart::new(title, "time, ms", y, series.collect()).logarithmic()
+    Panel {
+        title: "Plant: worst of twelve crossings".to_owned(),
+        x_name: "time of a crossing, ms".to_owned(),
+        y_name: "relative error".to_owned(),
+        x_axis: Scale::Log,
+        y_axis: Scale::Log,
+        x: padded(extent(lines[0].points.iter().map(|at| at.0)).unwrap_or_default(), 0.03),
+        marks: lines.iter().map(Line::dots).collect(),
+        lines,
+        ..Panel::default()
+    }
 }
 
 /// The tables of a measurement.
-pub fn tables(report: &Report) -> String {
-    let tables = [rollout_table(report), plant_table(report), peers_table(&report.peers)];
-    let mut text = tables.concat();
+pub(crate) fn tables(report: &Report) -> String {
+    let mut text = rollout_table(report) + &plant_table(report);
     if let Some(why) = &report.cycles_left_out {
         text += &format!("left out: {why}\n");
     }
@@ -125,20 +108,6 @@ fn plant_table(report: &Report) -> String {
     format!("{}\n\n", plain(&head, rows))
 }
 
-fn peers_table(peers: &Peers) -> String {
-    let ring = peers.least_seconds.iter().find(|(name, _)| name == RING).and_then(|own| own.1);
-    let rows = peers.least_seconds.iter().map(|(name, seconds)| {
-        let never = || "never".to_owned();
-        vec![
-            name.clone(),
-            seconds.map_or_else(never, |seconds| number(1e3 * seconds, 2)),
-            seconds.zip(ring).map_or_else(never, |(seconds, ring)| number(seconds / ring, 1)),
-        ]
-    });
-    let within = format!("ms within {} %", 100.0 * LEVEL);
-    format!("{}\n\n", plain(&["method", &within, "over the ring"], rows))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -152,7 +121,7 @@ mod tests {
         assert!(new.ends_with("<!-- bench: y -->\n```text\nnew\n```\n<!-- end -->\n"), "{new}");
         assert!(filled(page, "z", "").unwrap_err().to_string().contains("`z`"));
         let docs = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs");
-        for (page, name) in [("EMULATION", "model"), ("PLANT", "plant"), ("PLANT", "solvers")] {
+        for (page, name) in [("EMULATION", "model"), ("PLANT", "plant")] {
             let page = fs::read_to_string(format!("{docs}/{page}.md")).unwrap();
             assert!(filled(&page, name, "").is_ok(), "{name}");
         }

@@ -11,7 +11,7 @@ use hil_sim::cli::output;
 use hil_sim::progress;
 
 /// Measures run time against error: the rolled-out tread in fixed point, the
-/// plant's resolution, other solvers on the same crossing.
+/// plant's resolution.
 ///
 /// Times are processor time of one thread.
 #[derive(Debug, clap::Args)]

@@ -3,7 +3,6 @@
 use std::path::PathBuf;
 
 use super::{docs, failed, write};
-use crate::figure_svg::svg;
 use crate::paper::{self, Study, page};
 use hil_sim::cli::failure::{Failure, Outcome};
 use hil_sim::cli::output::{self, WithFiles};
@@ -36,8 +35,8 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
         paper::regenerate(&|| bar.advance(1)).map_err(failed)?
     };
     let mut files: Vec<(&str, String)> =
-        study.figures.iter().map(|figure| (figure.file.as_str(), svg(figure))).collect();
-    files.push(("README.md", page::markdown(&study)));
+        study.figures.iter().map(|figure| (figure.file.as_str(), figure.svg())).collect();
+    files.push(("README.md", page::markdown(&study).map_err(failed)?));
     files.push(("paper.json", paper::json(&study).map_err(Failure::run)? + "\n"));
     let files = write(&directory, files)?;
     let printed = WithFiles { result: &study, files: &files };
@@ -49,7 +48,7 @@ fn human(study: &Study, files: &[PathBuf]) -> String {
     let held = study.claims.iter().filter(|claim| claim.holds).count();
     let rows = study.claims.iter().map(|claim| {
         let verdict = if claim.holds { "holds" } else { "does not hold" };
-        vec![claim.claim.to_string(), claim.figure.to_owned(), verdict.to_owned()]
+        vec![claim.claim.clone(), claim.figure.clone(), verdict.to_owned()]
     });
     format!(
         "{} figures; of {} claims {held} hold and {} do not\n{}\n{}",

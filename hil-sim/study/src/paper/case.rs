@@ -8,7 +8,7 @@ use hil_sim::plant::arm::Arm;
 use hil_sim::scenario::{ControllerKind, Scenario};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Loads {
+pub(super) enum Loads {
     /// Of its theory and finite elements: 60 N on top, 100 N and more of preload.
     Fe,
     /// Of its rig: a third of that.
@@ -17,7 +17,7 @@ pub enum Loads {
 
 impl Loads {
     /// The rig with these loads.
-    pub fn rig(self) -> Rig {
+    pub(super) fn rig(self) -> Rig {
         match self {
             Self::Fe => Rig::fe(),
             Self::Prototype => Rig::prototype(),
@@ -27,7 +27,7 @@ impl Loads {
 
 /// A deployment at constant speed and preload.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Case {
+pub(super) struct Case {
     pub loads: Loads,
     /// Axial speed, mm/s.
     pub speed_mm_s: f64,
@@ -36,17 +36,17 @@ pub struct Case {
 }
 
 impl Case {
-    pub const fn new(loads: Loads, speed_mm_s: f64, preload_n: f64) -> Self {
+    pub(super) const fn new(loads: Loads, speed_mm_s: f64, preload_n: f64) -> Self {
         Self { loads, speed_mm_s, preload_n }
     }
 
     /// Speed and preload as text.
-    pub fn name(&self) -> String {
+    pub(super) fn name(&self) -> String {
         format!("{} mm/s, {} N", self.speed_mm_s, self.preload_n)
     }
 
     /// Axial load that this wheel lifts, N.
-    pub fn load_n(&self) -> f64 {
+    pub(super) fn load_n(&self) -> f64 {
         let plant = self.loads.rig().plant;
         plant.top_load_n * plant.top_load_share
     }
@@ -61,14 +61,14 @@ impl Case {
 
     /// Radial force on a wheel that lifts its load from sleeve `level`, N: the preload,
     /// and what the inclined arm makes of the thrust.
-    pub fn pressing_n(&self, level: usize) -> f64 {
+    pub(super) fn pressing_n(&self, level: usize) -> f64 {
         let (arm, centre) = self.arm(level);
         self.preload_n + arm.thrust_ratio(centre) * self.load_n()
     }
 
     /// The deployment of the rig that `seed` draws: this preload and speed
     /// throughout, with room above the preload for its loop.
-    pub fn scenario(&self, seed: u64) -> Scenario {
+    pub(super) fn scenario(&self, seed: u64) -> Scenario {
         let mut scenario = Scenario { rig: self.loads.rig(), ..Scenario::default() };
         scenario.preset = if self.loads == Loads::Fe { "fe" } else { "prototype" }.to_owned();
         let preload = &mut scenario.rig.preload;
@@ -87,7 +87,7 @@ impl Case {
 /// The arm on each sleeve: the reference's, bent by the part of the collision force that
 /// lies across it.
 #[derive(Clone, Debug)]
-pub struct Arms {
+pub(super) struct Arms {
     arm: vibration::Arm,
     /// Sine of its angle from the pillar, by level.
     across: [f64; 3],
@@ -95,7 +95,7 @@ pub struct Arms {
 
 impl Arms {
     /// The arm of a case.
-    pub fn of(case: &Case) -> Result<Self, BeamError> {
+    pub(super) fn of(case: &Case) -> Result<Self, BeamError> {
         let across = std::array::from_fn(|level| {
             let (arm, centre) = case.arm(level);
             arm.angle(centre).sin()
@@ -104,17 +104,17 @@ impl Arms {
     }
 
     /// Force across the arm of a collision force from sleeve `level`, N.
-    pub fn across_n(&self, level: usize, collision_n: f64) -> f64 {
+    pub(super) fn across_n(&self, level: usize, collision_n: f64) -> f64 {
         self.across[level.min(2)] * collision_n
     }
 
     /// Deflection under a static collision force, mm.
-    pub fn static_mm(&self, level: usize, collision_n: f64) -> f64 {
+    pub(super) fn static_mm(&self, level: usize, collision_n: f64) -> f64 {
         1e3 * self.arm.compliance_m_per_n() * self.across_n(level, collision_n)
     }
 
     /// Its motion.
-    pub fn modal(&self) -> Result<Modal, BeamError> {
+    pub(super) fn modal(&self) -> Result<Modal, BeamError> {
         self.arm.modal(MODES)
     }
 }

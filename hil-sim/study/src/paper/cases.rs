@@ -2,14 +2,12 @@
 //! loads.
 
 use super::case::{Case, Loads};
-use super::claims::{FALLS, RISES, all_go, change, largest, percents, row, table, within};
+use super::claims::{FALLS, RISES, Verdict, all_go, change, fixed, largest, percents, within};
 use super::histories::{Histories, panels};
 use super::history::Quantity::{Collision, Impact, Vibration};
 use super::published::{CASES, COLLISION_N};
 use super::transitions::count_humps;
-use crate::figure::{Claim, Figure, Series, Source};
-
-const SECTION: &str = "Vibration transmission model";
+use crate::figure::{Figure, Series, Source};
 
 /// Part of a peak that is as good as nothing.
 const GONE: f64 = 0.02;
@@ -17,11 +15,11 @@ const GONE: f64 = 0.02;
 /// Two forces no farther apart than this, relative, are nearly identical.
 const NEARLY: f64 = 0.03;
 
-pub fn cases() -> [Case; 4] {
+pub(super) fn cases() -> [Case; 4] {
     CASES.map(|(speed, preload)| Case::new(Loads::Fe, speed, preload))
 }
 
-pub fn figure(all: &[Histories]) -> Figure {
+pub(super) fn figure(all: &[Histories]) -> Figure {
     let mut panels = panels(all);
     for ((panel, one), force) in panels.iter_mut().zip(all).zip(COLLISION_N) {
         let when = one.peaks(Collision, Source::Simulation)[0].time_s;
@@ -37,20 +35,15 @@ pub fn figure(all: &[Histories]) -> Figure {
     Figure::new("fig11", title, caption, CASES.len(), panels)
 }
 
-#[rustfmt::skip]
-pub fn claims(all: &[Histories]) -> Vec<Claim> {
+pub(super) fn verdicts(all: &[Histories]) -> Vec<Verdict> {
     let all @ [slow, pressed, fast, slowest]: [&Histories; 4] = std::array::from_fn(|i| &all[i]);
-    let first = |quantity, ends: [&Histories; 2], sense| {
+    let first = |id, quantity, ends: [&Histories; 2], sense| -> Verdict {
         let peaks = ends.map(|one| one.peaks_text(quantity)).join("; ");
-        let found = format!("{peaks} (theory; simulation; virtual rig, by stage).");
-        (all_go(ends.map(|one| one.peak(quantity, 0)), sense), found)
+        (id, all_go(ends.map(|one| one.peak(quantity, 0)), sense), vec![peaks])
     };
     let second = [slow, pressed].map(|one| one.peak(Collision, 1));
     let more = |stage| change(slow.peak(Collision, stage), pressed.peak(Collision, stage));
-    let more_found = |stage| {
-        let parts = percents(more(stage), 1, ", ");
-        format!("{parts} from 100 to 120 N at 5 mm/s (theory, simulation, virtual rig).")
-    };
+    let more_found = |stage| vec![percents(more(stage), 1, ", ")];
     let humps = all.map(|one| {
         let points = one.points(Collision, Source::Simulation);
         count_humps(points.iter().map(|p| p.1), 0.02)
@@ -65,49 +58,17 @@ pub fn claims(all: &[Histories]) -> Vec<Claim> {
     };
     let in_order = (0..4).all(|a| (0..4).all(|b| alike(a, b)));
     let stresses = [0, 1, 2, 3].map(|i| format!("{:.1} N, {:.0} kPa", less[i][1], impact[i][1]));
-    table("fig11", SECTION, [
-        row("collision-decays-periodically", (humps > 3, format!(
-                "At most {humps} peaks in a deployment with three transitions, in the simulation."
-            )),
-            "The collision force decays periodically, because the tread is elastic.",
-            "One peak a transition. The wheel closes in on the corner at 2 to 4 mm/s and never \
-             leaves it: it climbs and does not bounce."),
-        row("collision-falls-with-preload", first(Collision, [slow, pressed], FALLS),
-            "At 5 mm/s the collision force of the first transition is smaller at 120 N than at \
-             100 N.",
-            "It is larger, as climbing must be: the axial force is the pressing force times the \
-             tangent of the angle at which the corner bears. The study contradicts itself here \
-             between its first and its second transition."),
-        row("collision-grows-with-speed", first(Collision, [slow, fast], RISES),
-            "At 100 N the collision is larger at 8 mm/s than at 5 mm/s.", ""),
-        row("collision-grows-with-speed-120", first(Collision, [slowest, pressed], RISES),
-            "At 120 N, too, the collision grows with the speed (5 mm/s against 3 mm/s).", ""),
-        row("second-collision-grows-with-preload",
-            (all_go(second, RISES), more_found(1)),
-            "In the second transition more preload makes for a larger force.", ""),
-        row("third-collision-equal", (within(more(2), NEARLY), more_found(2)),
-            "In the third transition 20 N more preload make no difference: the peaks are nearly \
-             identical.",
-            "Nothing in the third transition differs but the inclination of the arm, by two \
-             degrees from the second: more preload has the same effect in all three."),
-        row("stress-of-collision-less-preload", (in_order, format!(
-                "Collision less preload and impact of the four cases (simulation): {}.",
-                stresses.join("; "))),
-            "The stress wave is determined by the difference between collision force and preload.",
-            "The two are not even in the same order: the speed stiffens the tread and narrows the \
-             contact, which raises the stress at nearly the same force."),
-        row("impact-decays-to-zero", (left < GONE, format!(
-                "Once the wheel is on the last sleeve at most {left:.3} of the peak is left, in \
-                 any case and source.")),
-            "The impact load decays to zero.", ""),
-        row("impact-falls-with-preload", first(Impact, [slow, pressed], FALLS),
-            "More preload makes for a smaller impact in the first transition.",
-            "The force grows more than the area on which it acts."),
-        row("vibration-grows-with-speed", first(Vibration, [slow, fast], RISES),
-            "At the same load and preload the vibration amplitude grows with the speed.", ""),
-        row("vibration-falls-with-preload", first(Vibration, [slow, pressed], FALLS),
-            "At the same load and speed more preload makes for a smaller vibration amplitude.",
-            "The arm's deflection follows the collision force, which grows. What does fall is the \
-             gap, which the study equates with the amplitude: figures 15 and 16."),
-    ])
+    vec![
+        ("collision-decays-periodically", humps > 3, vec![humps.to_string()]),
+        first("collision-falls-with-preload", Collision, [slow, pressed], FALLS),
+        first("collision-grows-with-speed", Collision, [slow, fast], RISES),
+        first("collision-grows-with-speed-120", Collision, [slowest, pressed], RISES),
+        ("second-collision-grows-with-preload", all_go(second, RISES), more_found(1)),
+        ("third-collision-equal", within(more(2), NEARLY), more_found(2)),
+        ("stress-of-collision-less-preload", in_order, vec![stresses.join("; ")]),
+        ("impact-decays-to-zero", left < GONE, fixed(3, [left])),
+        first("impact-falls-with-preload", Impact, [slow, pressed], FALLS),
+        first("vibration-grows-with-speed", Vibration, [slow, fast], RISES),
+        first("vibration-falls-with-preload", Vibration, [slow, pressed], FALLS),
+    ]
 }

@@ -26,7 +26,7 @@ use hil_sim::scenario::Scenario;
 use hil_sim::session::{Options, RunningRig, Session};
 
 /// Crossings of a deployment.
-pub const STAGES: usize = 3;
+pub(super) const STAGES: usize = 3;
 
 /// Longest run, s: all of the travel in the slowest case, with room.
 const LONGEST_S: f64 = 60.0;
@@ -39,7 +39,7 @@ const CHOICE: u64 = 40;
 
 /// One crossing as the rig saw it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Reading {
+pub(super) struct Reading {
     /// Gap measured by the controller, mm.
     pub gap_mm: f64,
     pub true_gap_mm: f64,
@@ -53,7 +53,7 @@ pub struct Reading {
 
 /// One deployment.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Run {
+pub(super) struct Run {
     /// Readings of the three crossings; none of one that was not completed.
     pub crossings: Vec<Reading>,
     /// The log: what is true at its times.
@@ -67,7 +67,7 @@ pub struct Run {
 
 impl Run {
     /// Mean over the crossings of a figure; none if none was completed.
-    pub fn mean(&self, figure: impl Fn(&Reading) -> f64) -> Option<f64> {
+    pub(super) fn mean(&self, figure: impl Fn(&Reading) -> f64) -> Option<f64> {
         let count = self.crossings.len();
         (count > 0).then(|| self.crossings.iter().map(figure).sum::<f64>() / count as f64)
     }
@@ -75,21 +75,21 @@ impl Run {
 
 /// Forty runs of a case.
 #[derive(Clone, Debug)]
-pub struct Experiment {
+pub(super) struct Experiment {
     pub case: Case,
     /// Its runs, by seed from 1.
     pub runs: Vec<Run>,
 }
 
 /// The runs of each of four means, drawn once for all cases.
-pub fn groups() -> Vec<Vec<usize>> {
+pub(super) fn groups() -> Vec<Vec<usize>> {
     let mut all: Vec<usize> = (0..RUNS).collect();
     all.shuffle(&mut ChaCha8Rng::seed_from_u64(CHOICE));
     all.chunks(RUNS_OF_A_MEAN).map(<[usize]>::to_vec).collect()
 }
 
 /// Adds the four means of `all`, by run, and their range to the marks at `x`.
-pub fn marks(x: f64, all: &[f64], series: &mut Series) {
+pub(super) fn marks(x: f64, all: &[f64], series: &mut Series) {
     for group in groups() {
         let of: Vec<f64> = group.iter().filter_map(|&run| all.get(run).copied()).collect();
         series.points.push((x, of.iter().sum::<f64>() / of.len() as f64));
@@ -98,7 +98,7 @@ pub fn marks(x: f64, all: &[f64], series: &mut Series) {
 }
 
 /// Runs every case on forty rigs; `done` is called after each run.
-pub fn run_all(cases: &[Case], done: &(dyn Fn() + Sync)) -> Result<Vec<Experiment>> {
+pub(super) fn run_all(cases: &[Case], done: &(dyn Fn() + Sync)) -> Result<Vec<Experiment>> {
     let pairs: Vec<(Case, u64)> =
         cases.iter().flat_map(|case| (1..=RUNS as u64).map(move |seed| (*case, seed))).collect();
     let runs: Vec<Run> = pairs
@@ -114,7 +114,7 @@ pub fn run_all(cases: &[Case], done: &(dyn Fn() + Sync)) -> Result<Vec<Experimen
 }
 
 /// One deployment of the rig that `seed` draws.
-pub fn run(case: &Case, seed: u64) -> Result<Run> {
+pub(super) fn run(case: &Case, seed: u64) -> Result<Run> {
     run_as(case, &case.scenario(seed))
 }
 

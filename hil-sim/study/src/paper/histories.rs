@@ -23,7 +23,7 @@ const LEFT_MM: f64 = 2.0;
 
 /// The largest value of a transition.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Peak {
+pub(super) struct Peak {
     /// When, s.
     pub time_s: f64,
     /// Where the wheel is then, mm.
@@ -32,7 +32,7 @@ pub struct Peak {
 }
 
 #[derive(Clone, Debug)]
-pub struct Histories {
+pub(super) struct Histories {
     pub case: Case,
     /// The controller's model.
     theory: History,
@@ -48,7 +48,7 @@ pub struct Histories {
 
 impl Histories {
     /// Theory and simulation of the experiment's case, and its four means.
-    pub fn new(experiment: &Experiment) -> Result<Self> {
+    pub(super) fn new(experiment: &Experiment) -> Result<Self> {
         let case = experiment.case;
         let arms = Arms::of(&case)?;
         // All means are as long as the shortest log of all runs.
@@ -78,13 +78,13 @@ impl Histories {
     }
 
     /// Values of a quantity from a source.
-    pub fn points(&self, quantity: Quantity, source: Source) -> Points {
+    pub(super) fn points(&self, quantity: Quantity, source: Source) -> Points {
         self.history(source).points(quantity)
     }
 
     /// Largest value in each of the three transitions. They are told apart by where the wheel
     /// is: the experiment's is slower than the case while its preload rises.
-    pub fn peaks(&self, quantity: Quantity, source: Source) -> [Peak; STAGES] {
+    pub(super) fn peaks(&self, quantity: Quantity, source: Source) -> [Peak; STAGES] {
         let peak = |now: &Instant| {
             let Instant { time_s, position_mm, .. } = *now;
             Peak { time_s, position_mm, value: quantity.of(now) }
@@ -99,24 +99,24 @@ impl Histories {
     }
 
     /// The largest values of the three transitions, from each source.
-    pub fn peak_values(&self, quantity: Quantity) -> [[f64; STAGES]; 3] {
+    pub(super) fn peak_values(&self, quantity: Quantity) -> [[f64; STAGES]; 3] {
         SOURCES.map(|source| self.peaks(quantity, source).map(|peak| peak.value))
     }
 
     /// The largest value of one transition, counted from 0, from each source.
-    pub fn peak(&self, quantity: Quantity, stage: usize) -> [f64; 3] {
+    pub(super) fn peak(&self, quantity: Quantity, stage: usize) -> [f64; 3] {
         self.peak_values(quantity).map(|peaks| peaks[stage])
     }
 
     /// The largest values by transition, as text.
-    pub fn peaks_text(&self, quantity: Quantity) -> String {
+    pub(super) fn peaks_text(&self, quantity: Quantity) -> String {
         let of = |peaks: [f64; STAGES]| peaks.map(|peak| format!("{peak:.1}")).join(", ");
         format!("{}: {}", self.case.name(), self.peak_values(quantity).map(of).join("; "))
     }
 
     /// Largest value after the third transition, beyond the largest before the first, over
     /// the largest of all, from each source.
-    pub fn left_over(&self, quantity: Quantity) -> [f64; 3] {
+    pub(super) fn left_over(&self, quantity: Quantity) -> [f64; 3] {
         // The wheel's patch behind the last edge, and the arm's ring-down.
         let after = stage_ends_mm(&self.case)[STAGES - 1] + LEAVES_MM + 0.2 * self.case.speed_mm_s;
         SOURCES.map(|source| {
@@ -130,7 +130,7 @@ impl Histories {
         })
     }
 
-    pub fn panel(&self, quantity: Quantity) -> Chart {
+    pub(super) fn panel(&self, quantity: Quantity) -> Chart {
         let title = format!("{} {}", ["(a)", "(b)", "(c)"][quantity as usize], self.case.name());
         let means = self.means.iter().map(|mean| mean.points(quantity));
         let of = |source| Series::new(source, thin(&self.points(quantity, source)));
@@ -139,12 +139,12 @@ impl Histories {
     }
 
     /// Clearance from the root of the first step until the centre passes it.
-    pub fn clearance(&self, source: Source) -> Points {
+    pub(super) fn clearance(&self, source: Source) -> Points {
         self.history(source).clearance_until(f64::INFINITY)
     }
 
     /// The clearance at the first step as a plot.
-    pub fn clearance_panel(&self) -> Chart {
+    pub(super) fn clearance_panel(&self) -> Chart {
         let title = format!("Clearance (Fig. 16): {}", self.case.name());
         let shown = |source| self.clearance(source).into_iter().step_by(SHOWN_OF).collect();
         let means = self.means.iter().map(|m| m.clearance_until(self.first_passed_s - 0.2));
@@ -155,7 +155,7 @@ impl Histories {
 }
 
 /// All quantities of all cases as plots.
-pub fn panels(all: &[Histories]) -> Vec<Chart> {
+pub(super) fn panels(all: &[Histories]) -> Vec<Chart> {
     let row = |quantity| all.iter().map(move |one| one.panel(quantity));
     Quantity::ALL.into_iter().flat_map(row).collect()
 }
@@ -175,7 +175,7 @@ fn thin(points: &[(f64, f64)]) -> Points {
 }
 
 /// Where the wheel has left each of the steps behind, mm.
-pub fn stage_ends_mm(case: &Case) -> [f64; STAGES] {
+pub(super) fn stage_ends_mm(case: &Case) -> [f64; STAGES] {
     let steps = case.loads.rig().rig.step_positions_mm;
     std::array::from_fn(|stage| steps[stage] + LEFT_MM)
 }

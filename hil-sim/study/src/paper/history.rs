@@ -3,14 +3,14 @@
 use super::published::LOG_S;
 
 /// Interval of theory and simulation, s.
-pub const INTERVAL_S: f64 = 0.01;
+pub(super) const INTERVAL_S: f64 = 0.01;
 
 /// Points: time, s, and value.
-pub type Points = Vec<(f64, f64)>;
+pub(super) type Points = Vec<(f64, f64)>;
 
 /// The state of a deployment.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Instant {
+pub(super) struct Instant {
     /// Time since the motion began, s.
     pub time_s: f64,
     /// Axial position of the wheel, mm.
@@ -29,14 +29,14 @@ pub struct Instant {
 /// A deployment, an instant an interval: the arm's deflection is the largest in the interval
 /// before.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct History {
+pub(super) struct History {
     pub instants: Vec<Instant>,
     largest_um: f64,
 }
 
 impl History {
     /// Takes an instant not before the last; whether it is kept.
-    pub fn push(&mut self, now: &Instant, interval_s: f64) -> bool {
+    pub(super) fn push(&mut self, now: &Instant, interval_s: f64) -> bool {
         self.largest_um = self.largest_um.max(now.arm_um.abs());
         if now.time_s < self.instants.len() as f64 * interval_s - 1e-9 {
             return false;
@@ -78,7 +78,7 @@ impl History {
 
 /// One of the quantities of an [`Instant`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Quantity {
+pub(super) enum Quantity {
     /// [`Instant::collision_n`].
     Collision,
     /// [`Instant::impact_kpa`].
@@ -89,10 +89,10 @@ pub enum Quantity {
 
 impl Quantity {
     /// All three, in the order of cause and effect.
-    pub const ALL: [Self; 3] = [Self::Collision, Self::Impact, Self::Vibration];
+    pub(super) const ALL: [Self; 3] = [Self::Collision, Self::Impact, Self::Vibration];
 
     /// Name and unit.
-    pub const fn axis(self) -> &'static str {
+    pub(super) const fn axis(self) -> &'static str {
         ["collision, N", "impact, kPa", "vibration, µm"][self as usize]
     }
 

@@ -5,14 +5,14 @@ use anyhow::Result;
 use interstage::rig::Rig;
 
 use super::case::{Case, Loads};
-use super::claims::{BySource, change, largest, percents, row, table, within};
+use super::claims::{BySource, Verdict, change, fixed, largest, percents, within};
 use super::experiment::{Experiment, Reading, Run, marks};
 use super::history::Points;
-use super::published::{CONSTRAINED_HZ, FREE_HZ, LEAST_PRELOAD_N, LEAST_SPEED_MM_S, RIG_PRELOAD_N};
+use super::published::{CONSTRAINED_HZ, FREE_HZ, LEAST_PRELOAD_N, LEAST_SPEED_MM_S};
 use super::simulation;
 use super::sweeps::Curves;
 use super::theory::{self, Drive};
-use crate::figure::{Chart, Claim, Figure, Series, Source};
+use crate::figure::{Chart, Figure, Series, Source};
 use crate::reference::beam::BeamError;
 use crate::reference::vibration::Arm;
 use hil_sim::plant::balance::{Axial, BalanceError};
@@ -22,7 +22,7 @@ use hil_sim::plant::spread::Section;
 use hil_sim::rollout::{CrossingSetup, Wheel, halved};
 
 /// The safe point, the faster one without and the faster one with more preload.
-pub const CASES: [(f64, f64); 3] = [(5.0, 33.3), (8.0, 33.3), (8.0, 40.0)];
+pub(super) const CASES: [(f64, f64); 3] = [(5.0, 33.3), (8.0, 33.3), (8.0, 40.0)];
 
 /// Speeds of the curve of preloads.
 const SPEEDS_MM_S: [f64; 6] = [3.0, 4.0, 5.0, 6.0, 7.0, 8.0];
@@ -33,14 +33,11 @@ const SAME: f64 = 0.01;
 /// Elements and stride of crossings of which the friction alone counts.
 const COARSE: (usize, f64) = (1440, 0.02);
 
-const INTRODUCED: &str = "Analysis of inter-stage transition state";
-const DISCUSSED: &str = "Analysis and discussion of test results";
-
 #[derive(Clone, Debug)]
-pub struct Hold {
+pub(super) struct Hold {
     /// Preload that holds the gap of the safe point against speed: theory, simulation.
     preload: (Points, Points),
-    /// Gap of each of [`CASES`], mm.
+    /// Mean gap of the three transitions in each of [`CASES`], mm.
     gaps: [BySource; 3],
     /// Gaps of [`CASES`] in every run, mm.
     read: Vec<Vec<f64>>,
@@ -54,17 +51,12 @@ pub struct Hold {
 }
 
 impl Hold {
-    pub fn cases() -> [Case; 3] {
+    pub(super) fn cases() -> [Case; 3] {
         CASES.map(|(speed, preload)| Case::new(Loads::Prototype, speed, preload))
     }
 
-    /// Mean gap of the three transitions in one of the cases, mm.
-    pub fn gap(&self, case: Case) -> BySource {
-        self.gaps[Self::cases().iter().position(|one| *one == case).expect("one of the cases")]
-    }
-
     /// Theory and simulation, and the experiments on [`Hold::cases`].
-    pub fn new(experiments: &[&Experiment]) -> Result<Self> {
+    pub(super) fn new(experiments: &[&Experiment]) -> Result<Self> {
         let [safe, ..] = Self::cases();
         let simulated = |case: &Case| simulation::lift(case, Drive::Driven, 1).map(|l| l.gap_mm);
         let mut gaps = [[0.0; 3]; 3];
@@ -104,7 +96,7 @@ impl Hold {
         })
     }
 
-    pub fn figure(&self) -> Figure {
+    pub(super) fn figure(&self) -> Figure {
         let preload = vec![
             Series::new(Source::Theory, self.preload.0.clone()),
             Series::new(Source::Simulation, self.preload.1.clone()),
@@ -135,13 +127,12 @@ impl Hold {
     }
 }
 
-/// The claims, with what all experiments and the gap over the speed say about them.
-#[rustfmt::skip]
-pub fn claims(hold: &Hold, experiments: &[Experiment], gap: &Curves) -> Vec<Claim> {
+/// The verdicts, with what all experiments and the gap over the speed say.
+pub(super) fn verdicts(hold: &Hold, experiments: &[Experiment], gap: &Curves) -> Vec<Verdict> {
     let Hold { preload, least_preload_n, friction_alone, response_um, .. } = hold;
     let (resonant, at_fastest) = response_um;
-    let [safe, faster, held] = Hold::cases();
-    let apart = |case| change(hold.gap(safe), hold.gap(case));
+    let [safe, faster, held] = hold.gaps;
+    let apart = |gap| change(safe, gap);
     let rig = Rig::prototype();
     let at_rig = experiments.iter().filter(|e| e.case.loads == Loads::Prototype);
     let runs: Vec<&Run> = at_rig.flat_map(|e| &e.runs).collect();
@@ -153,72 +144,32 @@ pub fn claims(hold: &Hold, experiments: &[Experiment], gap: &Curves) -> Vec<Clai
     let times = |values: &[f64]| values[values.len() - 1] / values[0];
     let (speed_times, gap_times) = (times(&gap.experiment.at), times(&gap.simulation));
     let least_hz = LEAST_SPEED_MM_S / rig.drive.ripple_pitch_mm;
-    let concluded = table("conclusion", DISCUSSED, [
-        row("preload-holds-the-gap", (within(apart(held), SAME), format!(
-                "At 8 mm/s 40 N give the gap of 5 mm/s and 33.3 N within {} (theory, simulation, \
-                 experiment), where 33.3 N are off by {}. The ring asks for {:.1} N: with the \
-                 first, the range of preloads that the study ran on its rig, {:.0} to {:.0} N, \
-                 though nothing is fitted to that.",
-                percents(apart(held), 2, ", "), percents(apart(faster), 2, ", "),
-                preload.1[SPEEDS_MM_S.len() - 1].1, RIG_PRELOAD_N.0, RIG_PRELOAD_N.1)),
-            "A faster wheel keeps the gap if the radial preload is raised at the transition.", ""),
-        row("gap-as-on-the-continuous-surface", (largest(gaps()) <= separation, format!(
-                "On the continuous wall wheel and wall never part (largest separation \
-                 {separation:.3} mm); at a step the least gap of all runs is \
-                 {:.2} mm.", gaps().fold(f64::INFINITY, f64::min))),
-            "Raising the preload makes the gap in the transition that of the continuous surface.",
-            "A wheel that bears on floor and corner always leaves the root of the step free. What \
-             can be held is the gap of a slower crossing, and the controller takes that as its \
-             reference."),
-    ]);
-    let introduced = table("conclusion", INTRODUCED, [
-        row("gap-in-proportion-to-speed", ((gap_times / speed_times - 1.0).abs() < 0.1, format!(
-                "The speed times {speed_times:.2} makes the gap times {gap_times:.3} (simulation, \
-                 at 40 N).")),
-            "At constant preload the gap expands in proportion to the speed.",
-            "It grows, but far less than in proportion, and nonlinearly, as the study finds in its \
-             figure 21: the gap of a wheel at rest is not zero."),
-        row("preload-follows-the-diameter", (swing > Noise::usual().preload_sensor_n, format!(
-                "By {swing:.2} N on average up to lift-off, with the preload loop closed; the \
-                 spring alone would give {:.1} N a \
-                 step.", rig.preload.spring_n_per_mm * rig.rig.step_height_mm)),
-            "At constant speed the radial preload fluctuates with the sleeve's diameter.", ""),
-        row("least-preload-100", ((least_preload_n / LEAST_PRELOAD_N - 1.0).abs() < 0.2, format!(
-                "A wheel that lifts 20 N of the 60 N at 5 mm/s grips over a step from \
-                 {least_preload_n:.0} N on, with the friction of {} and the arm of our \
-                 rig.", rig.plant.mu)),
-            "Under its top load the drive needs a radial preload of about 100 N (one third of the \
-             entire drive) to work.",
-            "There is such a bound, but it depends on the friction and on the load that falls to \
-             one wheel, and neither is published; with ours it lies lower."),
-        row("slip-is-possible", (*friction_alone > rig.plant.mu, format!(
-                "One wheel that lifts all of the rig's 20 N at 5 mm/s and 33.3 N between parallel \
-                 guides needs a friction of {friction_alone:.2}; ours has {}.", rig.plant.mu)),
-            "At a step the drive may slip or retreat.", ""),
-        row("least-speed-meets-a-natural-frequency",
-            ([CONSTRAINED_HZ, FREE_HZ].iter().any(|hz| (least_hz / hz - 1.0).abs() < 0.1), format!(
-                "The fastest periodic excitation that a drive like ours has there, its torque \
-                 ripple, comes at {least_hz:.1} Hz; the published modes are {FREE_HZ} and \
-                 {CONSTRAINED_HZ} Hz.")),
-            "At the least useful speed of 2.9741 mm/s the wheel is excited close to its natural \
-             frequency.",
-            "A tread passes its own contact in about a second at that speed. How the study gets \
-             2.9741 mm/s is not in its text, so that it cannot be followed."),
-    ]);
-    let resonance = table("conclusion", DISCUSSED, [
-        row("resonance-is-worst", (*resonant > 5.0 * at_fastest, format!(
-                "A force of 1 N at {CONSTRAINED_HZ} Hz moves the arm by {resonant:.1} µm, at the \
-                 ripple's frequency of 8 mm/s by {at_fastest:.2} µm.")),
-            "Near resonance the vibration is largest; keeping the excitation away from it keeps \
-             the vibration small.", ""),
-    ]);
-    let stages = table("conclusion", "Boundary conditions", [
-        row("six-stages",
-            (runs.iter().all(|run| run.stages == [true; 6]),
-             "The controller recognises all six in every run of the virtual rig.".into()),
-            "A complete transition has six contact stages.", ""),
-    ]);
-    [concluded, introduced, resonance, stages].concat()
+    let is_near = |value: f64, wanted: f64, part| (value / wanted - 1.0).abs() < part;
+    let asked = preload.1[SPEEDS_MM_S.len() - 1].1;
+    let mut kept = [held, faster].map(|gap| percents(apart(gap), 2, ", ")).to_vec();
+    kept.extend(fixed(1, [asked]));
+    let least_gap = gaps().fold(f64::INFINITY, f64::min);
+    let parted = vec![format!("{separation:.3}"), format!("{least_gap:.2}")];
+    let grown = vec![format!("{speed_times:.2}"), format!("{gap_times:.3}")];
+    let spring = rig.preload.spring_n_per_mm * rig.rig.step_height_mm;
+    let swung = vec![format!("{swing:.2}"), format!("{spring:.1}")];
+    let mu = rig.plant.mu;
+    let gripped = vec![format!("{least_preload_n:.0}"), mu.to_string()];
+    let needed = vec![format!("{friction_alone:.2}"), mu.to_string()];
+    let is_excited = [CONSTRAINED_HZ, FREE_HZ].into_iter().any(|hz| is_near(least_hz, hz, 0.1));
+    let moved = vec![format!("{resonant:.1}"), format!("{at_fastest:.2}")];
+    let has_six = runs.iter().all(|run| run.stages == [true; 6]);
+    vec![
+        ("preload-holds-the-gap", within(apart(held), SAME), kept),
+        ("gap-as-on-the-continuous-surface", largest(gaps()) <= separation, parted),
+        ("gap-in-proportion-to-speed", is_near(gap_times, speed_times, 0.1), grown),
+        ("preload-follows-the-diameter", swing > Noise::usual().preload_sensor_n, swung),
+        ("least-preload-100", is_near(*least_preload_n, LEAST_PRELOAD_N, 0.2), gripped),
+        ("slip-is-possible", *friction_alone > mu, needed),
+        ("least-speed-meets-a-natural-frequency", is_excited, fixed(1, [least_hz])),
+        ("resonance-is-worst", *resonant > 5.0 * at_fastest, moved),
+        ("six-stages", has_six, Vec::new()),
+    ]
 }
 
 /// Preload at which `gap` is the wanted one, N: secant steps, from two guesses.

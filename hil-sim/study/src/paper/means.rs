@@ -12,7 +12,7 @@ type Curve = [f64; 3];
 
 /// A sweep of the experiment as four mean curves and the range of all rigs.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Means {
+pub(super) struct Means {
     /// Where the curves are given.
     pub at: Vec<f64>,
     /// The four means there.
@@ -26,7 +26,7 @@ impl Means {
     ///
     /// Rigs that lack a reading are fitted without it; one with fewer than three is left
     /// out.
-    pub fn of(
+    pub(super) fn of(
         sweep: &[&Experiment],
         x: impl Fn(&Experiment) -> f64,
         figure: impl Fn(&Reading) -> f64,
@@ -55,7 +55,7 @@ impl Means {
     }
 
     /// Mean of the four means.
-    pub fn middle(&self) -> Vec<f64> {
+    pub(super) fn middle(&self) -> Vec<f64> {
         let count = self.curves.len() as f64;
         (0..self.at.len())
             .map(|i| self.curves.iter().map(|curve| curve[i]).sum::<f64>() / count)
@@ -63,13 +63,13 @@ impl Means {
     }
 
     /// Largest difference between two of the means at one place.
-    pub fn spread(&self) -> f64 {
+    pub(super) fn spread(&self) -> f64 {
         let ranges = (0..self.at.len()).filter_map(|i| extent(self.curves.iter().map(|c| c[i])));
         ranges.map(|(low, high)| high - low).fold(0.0, f64::max)
     }
 
     /// The means as series, the first with the range over all rigs.
-    pub fn series(&self) -> Vec<Series> {
+    pub(super) fn series(&self) -> Vec<Series> {
         let band = self.at.iter().zip(&self.range).map(|(&x, &(low, high))| (x, low, high));
         let mut range: Vec<_> = band.collect();
         let curves = self
@@ -84,7 +84,7 @@ impl Means {
 
 /// Largest distance of evenly spaced values from the straight line between their ends,
 /// over the distance between these: 0 for a line, positive above it.
-pub fn bend(values: &[f64]) -> f64 {
+pub(super) fn bend(values: &[f64]) -> f64 {
     let last = values.len() - 1;
     let rise = values[last] - values[0];
     let off = |i: usize| values[i] - values[0] - rise * i as f64 / last as f64;

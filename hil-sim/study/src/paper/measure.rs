@@ -16,7 +16,7 @@ pub(super) const LEAVES_MM: f64 = 8.0;
 
 /// Rolling resistance over radial force of this plant on the continuous wall at this
 /// speed, mm/s, and pressing force, N.
-pub fn resistance(plant: &VirtualRig, speed_mm_s: f64, pressing_n: f64) -> f64 {
+pub(super) fn resistance(plant: &VirtualRig, speed_mm_s: f64, pressing_n: f64) -> f64 {
     let ring = &plant.parameters().ring;
     let guess = ring.radius_mm - 0.3;
     let steady = rolling::solve(ring, speed_mm_s, guess, |c| c.cosine_n - pressing_n);
@@ -25,7 +25,7 @@ pub fn resistance(plant: &VirtualRig, speed_mm_s: f64, pressing_n: f64) -> f64 {
 
 /// Collision force, N, beyond this [`resistance`], within the inertia of the carriage,
 /// 0.3 N, as long as the wheel grips; 0 where the wheel has not yet touched the step ahead.
-pub fn collision_n(plant: &VirtualRig, resistance: f64) -> f64 {
+pub(super) fn collision_n(plant: &VirtualRig, resistance: f64) -> f64 {
     let (truth, parameters) = (plant.truth(), plant.parameters());
     let used = truth.utilisation;
     let thrust = if used == 0.0 { 0.0 } else { parameters.load_n };
@@ -45,7 +45,7 @@ pub fn collision_n(plant: &VirtualRig, resistance: f64) -> f64 {
 
 /// Mean stress that this collision force puts on the wheel, kPa (1e-3 N/mm^2): the force
 /// over the part of the wheel's undeformed surface that the step cuts off.
-pub fn impact_kpa(plant: &VirtualRig, collision_n: f64) -> f64 {
+pub(super) fn impact_kpa(plant: &VirtualRig, collision_n: f64) -> f64 {
     let (truth, parameters) = (plant.truth(), plant.parameters());
     let local = parameters.wall.local(truth.position_mm);
     let ring = &parameters.ring;
@@ -57,13 +57,13 @@ pub fn impact_kpa(plant: &VirtualRig, collision_n: f64) -> f64 {
 }
 
 /// Force over area, kPa; 0 where nothing touches.
-pub fn stress_kpa(force_n: f64, area_mm2: f64) -> f64 {
+pub(super) fn stress_kpa(force_n: f64, area_mm2: f64) -> f64 {
     if area_mm2 > 0.0 { 1e3 * force_n / area_mm2 } else { 0.0 }
 }
 
 /// [`corner_area_mm2`] of the step that the wheel is on, the one ahead if it is touched, with the
 /// centre at this height above the wall under it, mm.
-pub fn step_area_mm2(size: (f64, f64), wall: &LocalWall, height_mm: f64) -> f64 {
+pub(super) fn step_area_mm2(size: (f64, f64), wall: &LocalWall, height_mm: f64) -> f64 {
     let ahead = corner_area_mm2(size, wall.ahead_mm, height_mm - wall.rise_mm);
     if ahead > 0.0 { ahead } else { corner_area_mm2(size, -wall.behind_mm, height_mm) }
 }
@@ -75,7 +75,7 @@ pub fn step_area_mm2(size: (f64, f64), wall: &LocalWall, height_mm: f64) -> f64 
 /// centre has passed it, and u the height of the centre above the top, both mm. Range: 0
 /// where the corner is ahead of the wheel; the entire patch where it lies behind.
 /// Memory lets the trailing part of the patch go earlier: the true area is smaller.
-pub fn corner_area_mm2((radius, width): (f64, f64), ahead_mm: f64, above_mm: f64) -> f64 {
+pub(super) fn corner_area_mm2((radius, width): (f64, f64), ahead_mm: f64, above_mm: f64) -> f64 {
     let half = (above_mm / radius).clamp(-1.0, 1.0).acos();
     let start = (ahead_mm / radius).clamp(-1.0, 1.0).asin().max(-half);
     if ahead_mm > 0.0 && ahead_mm.hypot(above_mm) >= radius {
@@ -86,7 +86,7 @@ pub fn corner_area_mm2((radius, width): (f64, f64), ahead_mm: f64, above_mm: f64
 
 /// Contact area that belongs to a tread depth at lift-off, mm^2, by the nominal
 /// geometry: how a compression sensor's reading becomes an area.
-pub fn area_of_depth_mm2(case: &Case, depth_mm: f64) -> f64 {
+pub(super) fn area_of_depth_mm2(case: &Case, depth_mm: f64) -> f64 {
     let wheel = case.loads.rig().rig;
     let above = wheel.wheel_radius_mm - wheel.step_height_mm;
     let reach = wheel.wheel_radius_mm - depth_mm;

@@ -2,9 +2,9 @@
 
 use interstage::rig::Rig;
 
-use super::claims::{row, table};
+use super::claims::{Verdict, fixed};
 use super::published::{CONSTRAINED_HZ, FREE_HZ};
-use crate::figure::{Chart, Claim, Figure, Mark, Series, Source};
+use crate::figure::{Chart, Figure, Mark, Series, Source};
 use crate::reference::beam::{Beam, BeamError, Ends, Shape, Tip, bisect};
 
 /// Points of a mode shape.
@@ -17,7 +17,7 @@ const NEAR: f64 = 0.1;
 type Classical = fn(f64, f64) -> f64;
 
 #[derive(Clone, Debug)]
-pub struct Modes {
+pub(super) struct Modes {
     beam: Beam,
     /// Tip mass that the published constrained mode takes, kg.
     pub tip_mass_kg: f64,
@@ -35,7 +35,7 @@ pub struct Modes {
 
 impl Modes {
     /// Modes of the drive arm.
-    pub fn new() -> Result<Self, BeamError> {
+    pub(super) fn new() -> Result<Self, BeamError> {
         let beam = Beam::drive_arm();
         let tip_mass_kg = beam.tip_mass_for(CONSTRAINED_HZ)?;
         let first = |ends, mass_kg| {
@@ -59,7 +59,7 @@ impl Modes {
         Ok(Self { beam, tip_mass_kg, constrained, free, shapes, bare_hz })
     }
 
-    pub fn figure(&self) -> Figure {
+    pub(super) fn figure(&self) -> Figure {
         let of = |source, index: usize| {
             Series::new(source, vec![(0.0, self.constrained[index].1), (1.0, self.free[index].1)])
         };
@@ -119,31 +119,21 @@ impl Modes {
     }
 }
 
-#[rustfmt::skip]
-pub fn claims(modes: &Modes) -> Vec<Claim> {
+pub(super) fn verdicts(modes: &Modes) -> Vec<Verdict> {
     let (constrained, free) = (modes.constrained[1].1, modes.free[1].1);
     let mass_g = modes.tip_mass_kg * 1e3;
     let bare = modes.bare_hz;
     let near = |hz: f64, published: f64| (hz / published - 1.0).abs() < NEAR;
     // The torque ripple at the study's slowest and fastest.
-    let [least, most] = [3.0, 8.0].map(|speed| speed / Rig::prototype().drive.ripple_pitch_mm);
-    table("fig19", "Experiment scheme", [
-        row("first-constrained-276", (near(constrained, CONSTRAINED_HZ), format!(
-                "{constrained:.1} Hz with {mass_g:.1} g at the wheel's end, a mass that is fitted \
-                 to it and represents wheel, axle and what yields in the clamp; {:.1} Hz \
-                 without.", bare.0)),
-            "The first constrained mode is 276 Hz.", "").fitted(),
-        row("seventh-free-163", (near(free, FREE_HZ) || near(bare.1, FREE_HZ), format!(
-                "{free:.0} Hz with the mass at the wheel's end, {:.0} Hz without.", bare.1)),
-            "The seventh free mode is 163 Hz.",
-            "The arm alone is far too stiff for it. The published mode is that of the entire \
-             device, whose masses and joints the study does not give; a free body softer than the \
-             clamped arm bends somewhere else."),
-        row("no-coupling", (most < 0.8 * FREE_HZ.min(CONSTRAINED_HZ), format!(
-                "The drive's torque ripple excites with {least:.0} to {most:.0} Hz at the study's \
-                 3 to 8 mm/s, below {FREE_HZ} Hz.")),
-            "The design introduces no coupling: the excitation keeps away from the modes.", ""),
-    ])
+    let ripple = [3.0, 8.0].map(|speed| speed / Rig::prototype().drive.ripple_pitch_mm);
+    let is_free = near(free, FREE_HZ) || near(bare.1, FREE_HZ);
+    let is_below = ripple[1] < 0.8 * FREE_HZ.min(CONSTRAINED_HZ);
+    let first = fixed(1, [constrained, mass_g, bare.0]);
+    vec![
+        ("first-constrained-276", near(constrained, CONSTRAINED_HZ), first),
+        ("seventh-free-163", is_free, fixed(0, [free, bare.1])),
+        ("no-coupling", is_below, fixed(0, ripple)),
+    ]
 }
 
 /// Frequency equation of a beam clamped at one end with a point mass, in beam masses, at

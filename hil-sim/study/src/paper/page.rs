@@ -2,33 +2,13 @@
 
 use std::fmt::Write as _;
 
+use anyhow::Result;
+
 use super::Study;
+use super::claims::{NotJudged, Said};
 use crate::figure::{Claim, Figure, Mark, Source};
 
-/// What the study claims and nothing here can judge, and why.
-const NOT_JUDGED: [(&str, &str); 4] = [
-    (
-        "Stress concentrates on the drive arm as the preload rises (Simulation analysis results).",
-        "It takes a three-dimensional model of the arm, whose shape is not published.",
-    ),
-    (
-        "Deformation displacements of the finite elements in collision and impact, the six \
-         constrained modes, the values of the last test (Tables 2, 3, 4).",
-        "The tables are not part of the text, and are found nowhere else.",
-    ),
-    (
-        "The values of the curves (Figs. 11, 16, 20 to 24).",
-        "They are in images alone; nothing is read off them.",
-    ),
-    (
-        "Wear, momentary slip and delayed preload make the differences between the means \
-         (Analysis and discussion of test results).",
-        "The tolerances of the virtual rig are chosen: how they share in its spread says nothing of the \
-         study's.",
-    ),
-];
-
-pub fn markdown(study: &Study) -> String {
+pub(crate) fn markdown(study: &Study) -> Result<String> {
     let held = study.claims.iter().filter(|claim| claim.holds).count();
     let fitted = study.claims.iter().filter(|claim| claim.holds && claim.fitted).count();
     let mut page = format!(
@@ -39,7 +19,7 @@ pub fn markdown(study: &Study) -> String {
          is independent of them: this project's own finite elements ([fe](../../hil-sim/study/fe/README.md)), a \
          rubber 8 mm thick, pushed without friction, with one modulus calibrated to the ring. What is fitted to \
          what: [PLANT.md](../PLANT.md#what-is-fitted-and-what-is-independent).\n\n\
-         Filled diamonds are numbers that the study prints; to hollow ones a parameter is fitted. A claim that \
+         Filled squares are numbers that the study prints; to hollow ones a parameter is fitted. A claim that \
          holds because of a fit, to the study or of one source to another, is marked.\n\n\
          Of {} claims {held} hold, {fitted} of these because something is fitted to them, and {} do not. Code \
          judges each claim from the data of its figure, which are in [paper.json](paper.json).\n",
@@ -50,10 +30,10 @@ pub fn markdown(study: &Study) -> String {
         section(&mut page, figure, &study.claims);
     }
     page += "\n## Not judged\n\n| claim | why not |\n|---|---|\n";
-    for (claim, why) in NOT_JUDGED {
-        let _ = writeln!(page, "| {claim} | {why} |");
+    for NotJudged { claim, reason } in Said::read()?.not_judged {
+        let _ = writeln!(page, "| {claim} | {reason} |");
     }
-    page
+    Ok(page)
 }
 
 fn section(page: &mut String, figure: &Figure, claims: &[Claim]) {

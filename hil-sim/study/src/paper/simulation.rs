@@ -24,7 +24,7 @@ const QUIET_S: f64 = 1e-3;
 ///
 /// The area is the part of the wheel that the step cuts off, as a compression sensor
 /// would have it: elements of the ring enter and leave as a whole.
-pub fn lift(case: &Case, drive: Drive, level: usize) -> Result<Lift, BalanceError> {
+pub(super) fn lift(case: &Case, drive: Drive, level: usize) -> Result<Lift, BalanceError> {
     let CrossingSetup { preload_n, load_n, .. } = setup(case, drive, level);
     let reference = ReferenceCase {
         axial: load_n.map_or(Axial::Pushed, Axial::Driven),
@@ -44,7 +44,7 @@ const CELLS: usize = 4;
 /// A deployment of the driven wheel by the reference models, a crossing a step: the
 /// ring with memory and inertia, the waves that its stress sends through the tread, and the
 /// arm that it bends.
-pub fn deployment(case: &Case, arms: &Arms) -> Result<History> {
+pub(super) fn deployment(case: &Case, arms: &Arms) -> Result<History> {
     let rig = case.loads.rig();
     let size = (rig.rig.wheel_radius_mm, rig.rig.wheel_width_mm);
     let steps = rig.rig.step_positions_mm.clone();

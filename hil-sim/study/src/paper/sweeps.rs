@@ -5,30 +5,30 @@ use anyhow::Result;
 use rayon::prelude::*;
 
 use super::case::{Case, Loads};
-use super::claims::{FALLS, RISES, goes, largest, percents, row, span, table};
+use super::claims::{FALLS, RISES, Verdict, fixed, goes, largest, percents, span};
 use super::experiment::{Experiment, Reading};
 use super::means::{Means, bend};
 use super::published::{AREA_SPREAD_MM2, DEPTH_SPREAD_MM, GAP_SPREAD_MM};
 use super::simulation;
 use super::theory::{self, Drive, Lift};
-use crate::figure::{Chart, Claim, Figure, Mark, Series, Source};
+use crate::figure::{Chart, Figure, Mark, Series, Source};
 
 /// Preloads of the sweep, N: from the least to the most that the study names for its
 /// rig.
-pub const PRELOADS_N: [f64; 5] = [33.3, 36.0, 40.0, 45.0, 50.0];
+pub(super) const PRELOADS_N: [f64; 5] = [33.3, 36.0, 40.0, 45.0, 50.0];
 /// Speed of the preload sweep, mm/s.
-pub const SPEED_MM_S: f64 = 5.0;
+pub(super) const SPEED_MM_S: f64 = 5.0;
 /// Speeds of the sweep, mm/s: between the slowest and the fastest of the study.
-pub const SPEEDS_MM_S: [f64; 5] = [3.0, 4.0, 5.0, 6.5, 8.0];
+pub(super) const SPEEDS_MM_S: [f64; 5] = [3.0, 4.0, 5.0, 6.5, 8.0];
 /// Preload of the speed sweep, N.
-pub const PRELOAD_N: f64 = 40.0;
+pub(super) const PRELOAD_N: f64 = 40.0;
 
 /// Points of a curve.
 const GRID: usize = 11;
 
 /// What is swept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Variable {
+pub(super) enum Variable {
     /// Preload, at [`SPEED_MM_S`].
     Preload,
     /// Speed, at [`PRELOAD_N`].
@@ -36,7 +36,7 @@ pub enum Variable {
 }
 
 impl Variable {
-    pub fn case(self, value: f64) -> Case {
+    pub(super) fn case(self, value: f64) -> Case {
         match self {
             Self::Preload => Case::new(Loads::Prototype, SPEED_MM_S, value),
             Self::Speed => Case::new(Loads::Prototype, value, PRELOAD_N),
@@ -44,7 +44,7 @@ impl Variable {
     }
 
     /// Cases of the experiment.
-    pub fn cases(self) -> Vec<Case> {
+    pub(super) fn cases(self) -> Vec<Case> {
         [PRELOADS_N, SPEEDS_MM_S][self as usize].map(|value| self.case(value)).to_vec()
     }
 
@@ -66,7 +66,7 @@ impl Variable {
 
 /// One quantity over a sweep from all three sources.
 #[derive(Clone, Debug)]
-pub struct Curves {
+pub(super) struct Curves {
     pub name: &'static str,
     pub unit: &'static str,
     /// Published largest difference between the four means.
@@ -101,28 +101,21 @@ impl Curves {
         self.all(|curve| bend(curve) * bend(&self.theory) > 0.0)
     }
 
-    fn ends(&self, decimals: usize) -> String {
-        let [theory, simulation, experiment] =
-            self.by_source().map(|values| span(&values, decimals, self.unit));
-        format!("Theory {theory}, simulation {simulation}, virtual rig {experiment}.")
+    /// First and last values of each source, as texts.
+    fn ends(&self, decimals: usize) -> Vec<String> {
+        self.by_source().map(|values| span(&values, decimals, self.unit)).to_vec()
     }
 
-    fn bends(&self) -> String {
+    /// The same, and how far the curves bend off the straight line between their ends.
+    fn ends_and_bends(&self) -> Vec<String> {
         let bends = percents(self.by_source().map(|values| bend(&values)), 1, " and ");
-        format!(
-            "Off the straight line between the ends by {bends} of the change (theory, simulation, \
-             virtual rig)."
-        )
+        [self.ends(3), vec![bends]].concat()
     }
 
     /// Whether the largest difference between the four means is the published one, and what
     /// it would take.
-    fn spread(&self, id: &'static str, means: &str, decimals: usize) -> Claim {
+    fn spread(&self, id: &'static str, decimals: usize) -> Verdict {
         let (ours, published, unit) = (self.experiment.spread(), self.published, self.unit);
-        let claim = format!(
-            "The largest difference between the four {means} of the {} is {published} {unit}.",
-            self.name
-        );
         // The tolerances that would be needed for the published one.
         let narrower = format!(
             "Ours is {:.0} % of the published one: between means of ten, {published} {unit} takes \
@@ -132,12 +125,12 @@ impl Curves {
             100.0 * ours / published,
             published / ours
         );
-        row(id, (alike(published, ours), format!("{ours:.decimals$} {unit}.")), claim, &narrower)
+        (id, alike(published, ours), vec![format!("{ours:.decimals$}"), narrower])
     }
 }
 
 #[derive(Clone, Debug)]
-pub struct Sweep {
+pub(super) struct Sweep {
     pub variable: Variable,
     /// Gap, mm.
     pub gap: Curves,
@@ -151,7 +144,7 @@ pub struct Sweep {
 
 impl Sweep {
     /// Theory, simulation, and what the experiments on [`Variable::cases`] gave.
-    pub fn new(variable: Variable, experiments: &[&Experiment]) -> Result<Self> {
+    pub(super) fn new(variable: Variable, experiments: &[&Experiment]) -> Result<Self> {
         let cases = variable.cases();
         let (from, to) = (variable.of(&cases[0]), variable.of(&cases[cases.len() - 1]));
         let at: Vec<f64> =
@@ -187,7 +180,7 @@ impl Sweep {
         })
     }
 
-    pub fn gap_figure(&self) -> Figure {
+    pub(super) fn gap_figure(&self) -> Figure {
         let (id, title) = match self.variable {
             Variable::Preload => ("fig20", "Contact gap against preload"),
             Variable::Speed => ("fig21", "Contact gap against speed"),
@@ -196,7 +189,7 @@ impl Sweep {
         self.figure(id, title, panels, vec![spread_mark("gap", &self.gap)])
     }
 
-    pub fn depth_figure(&self) -> Figure {
+    pub(super) fn depth_figure(&self) -> Figure {
         let (id, title) = match self.variable {
             Variable::Preload => ("fig22", "Embedding depth and contact area against preload"),
             Variable::Speed => ("fig23", "Embedding depth and contact area against speed"),
@@ -275,93 +268,54 @@ fn spread_mark(what: &str, curves: &Curves) -> Mark {
     Mark::new(what, curves.unit, (curves.published, false), &ours)
 }
 
-const SECTION: &str = "Analysis and discussion of test results";
-
 /// Whether a spread is the published one within a factor of two.
 fn alike(published: f64, ours: f64) -> bool {
     (0.5..=2.0).contains(&(ours / published))
 }
 
 /// Whether a published spread of the area is what geometry makes of that of the depth.
-fn spreads_agree(id: &'static str, sweep: &Sweep) -> Claim {
+fn spreads_agree(id: &'static str, sweep: &Sweep) -> Verdict {
     let rise = |curves: &Curves| curves.theory[GRID - 1] - curves.theory[0];
     let (depth_mm, area_mm2) = (sweep.depth.published, sweep.area.published);
     let expected = rise(&sweep.area) / rise(&sweep.depth) * depth_mm;
-    let found = format!(
-        "A tread that is {depth_mm} mm deeper touches {expected:.1} mm² more at lift-off; \
-         published are {area_mm2} mm²."
-    );
-    row(
-        id,
-        (alike(expected, area_mm2), found),
-        "The published spreads of depth and area belong to one wheel of 25 mm by 28 mm.",
-        "The two do not belong together: the study does not say how it made areas of its sensors.",
-    )
+    let found = vec![depth_mm.to_string(), format!("{expected:.1}"), area_mm2.to_string()];
+    (id, alike(expected, area_mm2), found)
 }
 
-/// The claims about both sweeps: figures 20 and 22, then 21 and 23.
-#[rustfmt::skip]
-pub fn claims(preload: &Sweep, speed: &Sweep, experiments: &[Experiment]) -> Vec<Claim> {
+/// The verdicts on both sweeps: figures 20 and 22, then 21 and 23.
+pub(super) fn verdicts(preload: &Sweep, speed: &Sweep, experiments: &[Experiment]) -> Vec<Verdict> {
     let Sweep { gap, true_gap, depth, area, .. } = preload;
     let middle = gap.experiment.middle();
     let fall = middle[0] - middle[GRID - 1];
     let [by_preload, by_speed] = [preload, speed].map(|sweep| sweep.gap.experiment.spread());
     let off = |(measured, is): (&f64, f64)| (measured - is).abs();
     let measured_off = largest(middle.iter().zip(true_gap.middle()).map(off));
-    let gaps_by_preload = table("fig20", SECTION, [
-        row("gap-falls-with-preload", (gap.go(FALLS), gap.ends(3)),
-            "At constant speed, more preload in the transition leaves a smaller contact gap; all \
-             four mean curves show the same trend.", ""),
-        gap.spread("gap-spread-preload", "mean curves", 3),
-        row("errors-do-not-hide-the-trend", (fall > by_preload, format!(
-                "The gap changes by {fall:.3} mm over the sweep, the means differ by \
-                 {by_preload:.3} mm at most; measured and true gap differ by {measured_off:.3} mm \
-                 at most.")),
-            "Wear, delayed preload and part tolerances do not hide how the gap depends on the \
-             conditions.", ""),
-    ]);
-    let depths_by_preload = table("fig22", SECTION, [
-        row("depth-grows-with-preload",
-            (depth.go(RISES) && depth.bend(), format!("{} {}", depth.ends(3), depth.bends())),
-            "At constant speed the embedding depth grows with the preload, nonlinearly.",
-            "It grows, but not all six curves bend to the same side."),
-        row("area-grows-with-depth-preload", (area.go(RISES), area.ends(1)),
-            "As the embedding depth grows with the preload, so does the contact area.", ""),
-        depth.spread("depth-spread-preload", "means", 3),
-        area.spread("area-spread-preload", "means", 2),
+    let trend = fixed(3, [fall, by_preload, measured_off]);
+    let over_preload = [
+        ("gap-falls-with-preload", gap.go(FALLS), gap.ends(3)),
+        gap.spread("gap-spread-preload", 3),
+        ("errors-do-not-hide-the-trend", fall > by_preload, trend),
+        ("depth-grows-with-preload", depth.go(RISES) && depth.bend(), depth.ends_and_bends()),
+        ("area-grows-with-depth-preload", area.go(RISES), area.ends(1)),
+        depth.spread("depth-spread-preload", 3),
+        area.spread("area-spread-preload", 2),
         spreads_agree("depth-and-area-spreads-agree-preload", preload),
-    ]);
+    ];
     let Sweep { gap, depth, area, .. } = speed;
     let over_speed = experiments.iter().filter(|e| Variable::Speed.cases().contains(&e.case));
     let slip_mm = largest(over_speed.flat_map(|e| &e.runs).map(|run| run.slip_mm));
-    let gaps_by_speed = table("fig21", SECTION, [
-        row("gap-grows-with-speed",
-            (gap.go(RISES) && gap.bend(), format!("{} {}", gap.ends(3), gap.bends())),
-            "At constant preload the contact gap grows with the speed, nonlinearly.", ""),
-        gap.spread("gap-spread-speed", "mean curves", 3),
-        row("speed-spreads-more", (by_speed > 1.1 * by_preload, format!(
-                "{by_speed:.3} mm over the speed, {by_preload:.3} mm over the preload; gross slip \
-                 of a run at most {slip_mm:.3} mm.")),
-            "The means differ more over the speed (0.32 mm) than over the preload (0.24 mm), \
-             because of wear and momentary slip.",
-            "The same forty rigs make both sweeps, and their tolerances move the entire curve."),
-    ]);
-    let depths_by_speed = table("fig23", SECTION, [
-        row("depth-grows-with-speed", (depth.go(RISES), depth.ends(3)),
-            "At constant preload the embedding depth grows with the speed.",
-            "It falls. Rubber stiffens with speed, so that the wheel sinks in less: that is why \
-             its gap grows. A wheel that sank in deeper would be lower over the root of the step \
-             and leave a smaller gap, against figure 21."),
-        row("area-grows-with-depth-speed", (area.go(RISES), area.ends(1)),
-            "The contact area grows with the speed, as the depth does.",
-            "It falls with the depth, for the same reason."),
-        row("area-follows-depth",
-            ([RISES, FALLS].into_iter().all(|sense| area.go(sense) == depth.go(sense)),
-             "Both change with the same sign in theory, simulation and all four means.".into()),
-            "Contact area and embedding depth change alike.", ""),
-        depth.spread("depth-spread-speed", "means", 3),
-        area.spread("area-spread-speed", "means", 2),
+    let wider = fixed(3, [by_speed, by_preload, slip_mm]);
+    let are_alike = [RISES, FALLS].into_iter().all(|sense| area.go(sense) == depth.go(sense));
+    let over_speed = [
+        ("gap-grows-with-speed", gap.go(RISES) && gap.bend(), gap.ends_and_bends()),
+        gap.spread("gap-spread-speed", 3),
+        ("speed-spreads-more", by_speed > 1.1 * by_preload, wider),
+        ("depth-grows-with-speed", depth.go(RISES), depth.ends(3)),
+        ("area-grows-with-depth-speed", area.go(RISES), area.ends(1)),
+        ("area-follows-depth", are_alike, Vec::new()),
+        depth.spread("depth-spread-speed", 3),
+        area.spread("area-spread-speed", 2),
         spreads_agree("depth-and-area-spreads-agree-speed", speed),
-    ]);
-    [gaps_by_preload, depths_by_preload, gaps_by_speed, depths_by_speed].concat()
+    ];
+    over_preload.into_iter().chain(over_speed).collect()
 }

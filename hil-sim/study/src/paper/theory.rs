@@ -16,7 +16,7 @@ use hil_sim::rollout::{CrossingSetup, Wheel, halved};
 /// Whether the wheel is pushed without friction, as in the study's theory, or drives
 /// itself against its load, as on a rig.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Drive {
+pub(super) enum Drive {
     /// Pushed at its axle over a frictionless wall.
     Pushed,
     /// Driven by torque, with the arm that presses it into the wall.
@@ -25,7 +25,7 @@ pub enum Drive {
 
 /// Figures of a crossing at the instant at which the lower wall stops carrying.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Lift {
+pub(super) struct Lift {
     pub gap_mm: f64,
     /// Tread depth at the corner, mm.
     pub depth_mm: f64,
@@ -39,14 +39,14 @@ pub struct Lift {
 
 impl Lift {
     /// With this gap and depth, mm, area, mm^2, and collision force, N.
-    pub fn new((gap_mm, depth_mm): (f64, f64), area_mm2: f64, collision_n: f64) -> Self {
+    pub(super) fn new((gap_mm, depth_mm): (f64, f64), area_mm2: f64, collision_n: f64) -> Self {
         let impact_kpa = stress_kpa(collision_n, area_mm2);
         Self { gap_mm, depth_mm, area_mm2, collision_n, impact_kpa }
     }
 }
 
 /// How the wheel crosses from sleeve `level`.
-pub fn setup(case: &Case, drive: Drive, level: usize) -> CrossingSetup {
+pub(super) fn setup(case: &Case, drive: Drive, level: usize) -> CrossingSetup {
     let (preload_n, load_n) = match drive {
         Drive::Pushed => (case.preload_n, None),
         Drive::Driven => (case.pressing_n(level), Some(case.load_n())),
@@ -55,7 +55,7 @@ pub fn setup(case: &Case, drive: Drive, level: usize) -> CrossingSetup {
 }
 
 /// The model's crossing from sleeve `level`; the collision is the largest of the crossing.
-pub fn lift(case: &Case, drive: Drive, level: usize) -> Result<Lift> {
+pub(super) fn lift(case: &Case, drive: Drive, level: usize) -> Result<Lift> {
     let rig = case.loads.rig();
     let crossed = Wheel::try_build(&rig)?.cross(&setup(case, drive, level));
     let crossed = crossed.context("a wheel that sinks in has no gap")?;
@@ -65,7 +65,7 @@ pub fn lift(case: &Case, drive: Drive, level: usize) -> Result<Lift> {
 }
 
 /// The same, mean over the three stages.
-pub fn mean_lift(case: &Case, drive: Drive) -> Result<Lift> {
+pub(super) fn mean_lift(case: &Case, drive: Drive) -> Result<Lift> {
     let all: Vec<Lift> = (0..3).map(|level| lift(case, drive, level)).collect::<Result<_>>()?;
     let mean = |figure: fn(&Lift) -> f64| all.iter().map(figure).sum::<f64>() / 3.0;
     Ok(Lift {
@@ -98,7 +98,7 @@ fn effective_stiffness(case: &Case) -> Result<f64> {
 
 /// A deployment of the driven wheel as an elastic ring of the stiffness that is effective at
 /// lift-off, and an arm that bends as under a static force.
-pub fn deployment(case: &Case, arms: &Arms) -> Result<History> {
+pub(super) fn deployment(case: &Case, arms: &Arms) -> Result<History> {
     let rig = case.loads.rig();
     let mut tread = RingParameters::of(&rig, COARSE.0);
     tread.k_inf *= effective_stiffness(case)?;

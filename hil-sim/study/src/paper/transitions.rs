@@ -3,14 +3,14 @@
 use std::ops::RangeInclusive;
 
 use super::case::{Case, Loads};
-use super::claims::{BySource, FALLS, RISES, all_go, goes, largest, row, spans, table, within};
+use super::claims::{BySource, FALLS, RISES, Verdict, all_go, fixed, goes, largest, spans, within};
 use super::histories::{Histories, panels};
 use super::history::Quantity::{self, Collision, Impact, Vibration};
-use crate::figure::{Claim, Figure, SOURCES, Source};
+use crate::figure::{Figure, SOURCES, Source};
 
 /// Cases: the study's four at a third of their preload, which spans the 33 to 40 N that
 /// it names. Its own table of them is not published.
-pub const CASES: [(f64, f64); 4] = [(5.0, 33.3), (5.0, 40.0), (8.0, 33.3), (3.0, 40.0)];
+pub(super) const CASES: [(f64, f64); 4] = [(5.0, 33.3), (5.0, 40.0), (8.0, 33.3), (3.0, 40.0)];
 
 /// Time of the first collision in the study, s.
 const FIRST_BEFORE_S: f64 = 2.0;
@@ -19,11 +19,11 @@ const FIRST_BEFORE_S: f64 = 2.0;
 /// interval.
 const AT_2_S: RangeInclusive<f64> = 1.9..=2.1;
 
-pub fn cases() -> [Case; 4] {
+pub(super) fn cases() -> [Case; 4] {
     CASES.map(|(speed, preload)| Case::new(Loads::Prototype, speed, preload))
 }
 
-pub fn figure(all: &[Histories]) -> Figure {
+pub(super) fn figure(all: &[Histories]) -> Figure {
     let caption = "Three transitions at rig loads (20 N on top, of which this wheel lifts a \
                    third). (a) Collision: axial force of the contact against the motion, beyond \
                    rolling resistance. (b) Impact: that force over the part of the wheel that the \
@@ -37,21 +37,14 @@ pub fn figure(all: &[Histories]) -> Figure {
     Figure::new("fig24", title, caption, CASES.len(), panels(all))
 }
 
-#[rustfmt::skip]
-pub fn claims(all: &[Histories]) -> Vec<Claim> {
+pub(super) fn verdicts(all: &[Histories]) -> Vec<Verdict> {
     let all @ [_, _, fast, _]: [&Histories; 4] = std::array::from_fn(|i| &all[i]);
     let least = |of: &dyn Fn(&Histories) -> f64| all.map(of).into_iter().fold(1.0, f64::min);
     let shapes = Quantity::ALL.map(|quantity| least(&|one| likeness(one, quantity)));
-    let falls = |quantity: Quantity| {
+    let falls = |id, quantity| -> Verdict {
         let peaks = all.map(|one| one.peak_values(quantity));
-        let texts = all.map(|one| one.peaks_text(quantity)).join(". ");
-        let found = format!(
-            "By stage, {} (theory; simulation; virtual rig). {texts}. Of what makes the stages \
-             differ there is the inclination of the arm alone: its thrust on the wheel falls by a \
-             few per cent from sleeve to sleeve.",
-            quantity.axis()
-        );
-        (peaks.iter().flatten().all(|by_stage| goes(by_stage, FALLS)), found)
+        let is_falling = peaks.iter().flatten().all(|by_stage| goes(by_stage, FALLS));
+        (id, is_falling, vec![all.map(|one| one.peaks_text(quantity)).join(". ")])
     };
     let following = [Impact, Vibration].map(|quantity| least(&|one| following(one, quantity)));
     let left: [f64; 3] = std::array::from_fn(|source| {
@@ -60,8 +53,8 @@ pub fn claims(all: &[Histories]) -> Vec<Claim> {
     });
     let peaks = fast.peak_values(Collision);
     let first_highest = peaks.iter().all(|by_stage| largest(*by_stage) <= by_stage[0]);
-    let [collided, hit, shaken] = Quantity::ALL
-        .map(|quantity| SOURCES.map(|source| fast.peaks(quantity, source)[0].time_s));
+    let [collided, hit, shaken] =
+        Quantity::ALL.map(|quantity| SOURCES.map(|source| fast.peaks(quantity, source)[0].time_s));
     let seconds = |times: BySource| times.map(|t| format!("{t:.2}")).join(", ");
     let until = fast.first_passed_s + 0.25;
     let humps = SOURCES.map(|source| {
@@ -69,7 +62,7 @@ pub fn claims(all: &[Histories]) -> Vec<Claim> {
         let first = points.iter().take_while(|p| p.0 <= until);
         count_humps(first.map(|p| p.1), 0.05)
     });
-    let pairs = |related: fn(&Case, &Case) -> bool, sense| {
+    let pairs = |id, related: fn(&Case, &Case) -> bool, sense| -> Verdict {
         let pairs = all.into_iter().flat_map(|a| all.map(|b| [a, b]));
         let pairs: Vec<_> = pairs.filter(|[a, b]| related(&a.case, &b.case)).collect();
         let first = |pair: &[&Histories; 2]| pair.map(|one| one.peak(Collision, 0));
@@ -78,65 +71,29 @@ pub fn claims(all: &[Histories]) -> Vec<Claim> {
             format!("{from} to {to}: {}", spans(first(pair), 1, "N"))
         };
         let texts = pairs.iter().map(text).collect::<Vec<_>>().join("; ");
-        let found = format!("{texts} (theory, simulation, virtual rig).");
-        (pairs.iter().all(|pair| all_go(first(pair), sense)), found)
+        (id, pairs.iter().all(|pair| all_go(first(pair), sense)), vec![texts])
     };
-    table("fig24", "Analysis and discussion of test results", [
-        row("three-sources-agree", (shapes.iter().all(|&shape| shape > 0.9), format!(
-                "Least correlation of simulation and virtual rig at the log's times with theory \
-                 over the four cases: collision {:.3}, impact {:.3}, vibration {:.3}.",
-                shapes[0], shapes[1], shapes[2])),
-            "Collision, impact and vibration show the same trends in theory, simulation and \
-             virtual rig.",
-            "The pulses are the same; they lie by up to 0.2 s apart, as each rig's steps \
-             do.").fitted(),
-        row("collision-peaks-fall", falls(Collision),
-            "The peaks of the collision fall from the first transition to the third.", ""),
-        row("impact-peaks-fall", falls(Impact),
-            "The peaks of the impact fall from the first transition to the third.",
-            "They differ by a per cent or two, which is what a log of 0.1 s leaves of a peak."),
-        row("vibration-peaks-fall", falls(Vibration),
-            "The peaks of the vibration fall from the first transition to the third.", ""),
-        row("impact-and-vibration-fall-with-collision",
-            (following.iter().all(|&least| least > 0.7), format!(
-                "Least correlation with the collision within a source: impact {:.2}, vibration \
-                 {:.2}.",
-                following[0], following[1])),
-            "Impact and vibration diminish as the collision does.", ""),
-        row("nothing-after-the-third", (within(left, 0.05), format!(
-                "Largest value after it, beyond that before the first, over the largest of all: \
-                 theory {:.3}, simulation {:.3}, virtual rig {:.3}. What is there before and after \
-                 is the drive's torque ripple, which shakes the arm between the steps as well.",
-                left[0], left[1], left[2])),
-            "After the third transition the values approach zero: contact is smooth.", ""),
-        row("collision-before-2-s", (largest(collided) < FIRST_BEFORE_S && first_highest, format!(
-                "At 8 mm/s, 33.3 N: {} s (theory, simulation, virtual rig).", seconds(collided))),
-            "The largest collision comes in the first transition, before 2 s.", ""),
-        row("impact-at-2-s",
-            (hit.iter().zip(collided).all(|(t, before)| AT_2_S.contains(t) && *t > before), format!(
-                "At 8 mm/s, 33.3 N: {} s, against {} s of the collision (theory, simulation, \
-                 virtual rig).", seconds(hit), seconds(collided))),
-            "The impact peaks at 2 s, after the collision, held up by the tread's deformation.",
-            "The stress peaks no later than the force: the corner then presses on a narrow part of \
-             the tread. A stress wave crosses the tread in about 0.1 ms: it cannot hold anything \
-             up by tenths of a second."),
-        row("vibration-peaks-twice", (humps.iter().all(|&count| count >= 2), format!(
-                "Peaks of the first transition at 8 mm/s, 33.3 N: {}, {}, {} (theory, simulation, \
-                 virtual rig), at {} s.", humps[0], humps[1], humps[2], seconds(shaken))),
-            "The vibration peaks before 2 s and again after it.",
-            "The arm follows the collision within milliseconds (its first mode is 276 Hz) and has \
-             one peak with it; no second one arises from stress waves."),
-        row("collision-grows-with-speed-rig",
-            pairs(|a, b| a.preload_n == b.preload_n && a.speed_mm_s < b.speed_mm_s, RISES),
-            "Within one sleeve and at the same preload, a faster wheel meets a larger \
-             collision.", ""),
-        row("collision-falls-with-preload-rig",
-            pairs(|a, b| a.speed_mm_s == b.speed_mm_s && a.preload_n < b.preload_n, FALLS),
-            "Within one sleeve and at the same speed, more preload makes for a smaller collision.",
-            "It makes for a larger one: the wheel climbs with the force that presses it, P tan of \
-             the angle at which the corner bears; the smaller gap turns that angle down by less \
-             than the force grows."),
-    ])
+    let is_faster = |a: &Case, b: &Case| a.preload_n == b.preload_n && a.speed_mm_s < b.speed_mm_s;
+    let is_pressed = |a: &Case, b: &Case| a.speed_mm_s == b.speed_mm_s && a.preload_n < b.preload_n;
+    let are_like = shapes.iter().all(|&shape| shape > 0.9);
+    let are_following = following.iter().all(|&least| least > 0.7);
+    let is_before = largest(collided) < FIRST_BEFORE_S && first_highest;
+    let is_after = hit.iter().zip(collided).all(|(t, before)| AT_2_S.contains(t) && *t > before);
+    let is_twice = humps.iter().all(|&count| count >= 2);
+    let peaks = humps.map(|count| count.to_string()).into_iter().chain([seconds(shaken)]);
+    vec![
+        ("three-sources-agree", are_like, fixed(3, shapes)),
+        falls("collision-peaks-fall", Collision),
+        falls("impact-peaks-fall", Impact),
+        falls("vibration-peaks-fall", Vibration),
+        ("impact-and-vibration-fall-with-collision", are_following, fixed(2, following)),
+        ("nothing-after-the-third", within(left, 0.05), fixed(3, left)),
+        ("collision-before-2-s", is_before, vec![seconds(collided)]),
+        ("impact-at-2-s", is_after, vec![seconds(hit), seconds(collided)]),
+        ("vibration-peaks-twice", is_twice, peaks.collect()),
+        pairs("collision-grows-with-speed-rig", is_faster, RISES),
+        pairs("collision-falls-with-preload-rig", is_pressed, FALLS),
+    ]
 }
 
 /// Local maxima that exceed the minima before and after them by this part of the largest

@@ -11,7 +11,7 @@
 
 mod roots;
 mod shapes;
-pub mod waves;
+pub(crate) mod waves;
 
 #[cfg(test)]
 mod tests;
@@ -24,22 +24,22 @@ use serde::Serialize;
 use waves::{End, Load, frequency_function};
 
 pub(crate) use roots::bisect;
-pub use shapes::Shape;
+pub(crate) use shapes::Shape;
 
 /// Most modes that may be asked for.
-pub const MAX_COUNT: usize = 20;
+pub(crate) const MAX_COUNT: usize = 20;
 
 /// Heaviest tip, in beam masses. Beyond it the first root sinks into rounding.
-pub const MAX_MASS_RATIO: f64 = 1e6;
+pub(crate) const MAX_MASS_RATIO: f64 = 1e6;
 
 /// Softest and stiffest spring at the tip other than none, in `EI / L^3`. Softer ones
 /// sink into rounding, stiffer ones are pins.
-pub const SPRING_RATIOS: (f64, f64) = (1e-6, 1e12);
+pub(crate) const SPRING_RATIOS: (f64, f64) = (1e-6, 1e12);
 
 /// An argument outside its range.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{argument} is {value}, expected {expected}")]
-pub struct BeamError {
+pub(crate) struct BeamError {
     pub argument: &'static str,
     /// What was given, in the unit of the argument's name.
     pub value: f64,
@@ -50,7 +50,8 @@ pub struct BeamError {
 /// How the beam is held: end A, then end B before any [`Tip`] is put on it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
-pub enum Ends {
+#[expect(clippy::enum_variant_names, reason = "both ends are named")]
+pub(crate) enum Ends {
     /// Held fast at the pillar.
     ClampedFree,
     /// Turning on its pivot at the pillar.
@@ -72,14 +73,14 @@ impl Ends {
 
 /// What end B carries. The default is nothing.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Tip {
+pub(crate) struct Tip {
     pub mass_kg: f64,
     /// Spring to ground across the beam, N/m.
     pub spring_n_per_m: f64,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Mode {
+pub(crate) struct Mode {
     /// Wave number times length, dimensionless.
     pub beta_l: f64,
     /// Natural frequency, Hz.
@@ -88,7 +89,7 @@ pub struct Mode {
 
 /// A uniform beam of rectangular section.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Beam {
+pub(crate) struct Beam {
     pub length_m: f64,
     /// Young's modulus, Pa.
     pub e_pa: f64,
@@ -107,7 +108,7 @@ impl Beam {
     /// Published: length, section 12 x 15 mm, alloy 2A12 (density 2780 kg/m^3, modulus
     /// 70 to 73 GPa by the source; 72.5 taken). Not published: which side of the
     /// section lies in that plane. Chosen: the 15 mm one, as one would mount it.
-    pub fn drive_arm() -> Self {
+    pub(crate) fn drive_arm() -> Self {
         Self {
             length_m: Rig::prototype().rig.arm_length_mm * 1e-3,
             e_pa: 72.5e9,
@@ -117,12 +118,12 @@ impl Beam {
         }
     }
 
-    pub fn mass_kg(&self) -> f64 {
+    pub(crate) fn mass_kg(&self) -> f64 {
         self.rho_kg_m3 * self.width_m * self.height_m * self.length_m
     }
 
     /// Bending stiffness EI, N m^2, with I = width height^3 / 12.
-    pub fn bending_stiffness_n_m2(&self) -> f64 {
+    pub(crate) fn bending_stiffness_n_m2(&self) -> f64 {
         self.e_pa * self.width_m * self.height_m.powi(3) / 12.0
     }
 
@@ -138,7 +139,7 @@ impl Beam {
     /// Cost: three bisections to the last bit a mode.
     /// Source: the study, eqs 41-54; classical roots in R. D. Blevins, "Formulas for
     /// Natural Frequency and Mode Shape", table 8-1.
-    pub fn modes(&self, ends: Ends, tip: Tip, count: usize) -> Result<Vec<Mode>, BeamError> {
+    pub(crate) fn modes(&self, ends: Ends, tip: Tip, count: usize) -> Result<Vec<Mode>, BeamError> {
         let (mass, spring) = self.ratios(tip)?;
         require("count", count as f64, (1..=MAX_COUNT).contains(&count), || {
             format!("1 to {MAX_COUNT} modes")
@@ -159,7 +160,7 @@ impl Beam {
     /// The published first constrained mode of the rig, 276 Hz, takes 62.9 g on
     /// [`Self::drive_arm`] (bare: 588.5 Hz). That is an equivalent mass, not a weighed one:
     /// it represents wheel and axle, and whatever yields in the clamp.
-    pub fn tip_mass_for(&self, frequency_hz: f64) -> Result<f64, BeamError> {
+    pub(crate) fn tip_mass_for(&self, frequency_hz: f64) -> Result<f64, BeamError> {
         let first = |mass| self.mode(roots::first(End::Clamped, mass, 0.0, 1)[0]).frequency_hz;
         let (bare_hz, least_hz) = (first(0.0), first(MAX_MASS_RATIO));
         let in_range = (least_hz..=bare_hz).contains(&frequency_hz);

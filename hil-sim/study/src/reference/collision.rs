@@ -22,7 +22,7 @@ const ITERATIONS: usize = 60;
 
 /// The wheel at one instant. The wall is y = 0 before the face at x = 0, y = h behind.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Sample {
+pub(crate) struct Sample {
     /// Time since the wheel's undeformed circle touched the corner, s.
     pub t_s: f64,
     /// Centre, mm.
@@ -49,7 +49,7 @@ pub struct Sample {
 /// `(omega dt)^2/12`, 0.2 % at 0.2 ms and 800 rad/s.
 /// Cost: some 10^4 steps of a few hundred elements.
 /// Source: derived; as the mass or the speed falls it becomes the quasi-static crossing.
-pub fn dynamic(case: &ReferenceCase) -> Result<Vec<Sample>, BalanceError> {
+pub(crate) fn dynamic(case: &ReferenceCase) -> Result<Vec<Sample>, BalanceError> {
     let radius = case.rig.rig.wheel_radius_mm;
     let height = case.rig.rig.step_height_mm;
     let wall = Wall::new(vec![Step { position_mm: 0.0, height_mm: height }]);

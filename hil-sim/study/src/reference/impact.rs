@@ -18,7 +18,7 @@ mod tests;
 
 /// A rod at some time. Pressure and inward motion are positive.
 #[derive(Clone, Debug)]
-pub struct Rod {
+pub(crate) struct Rod {
     rubber: Rubber,
     /// Part of a wave's pressure that the hub sends back: 1 rigid, 0 absorbing, -1 free.
     hub: f64,
@@ -35,7 +35,7 @@ pub struct Rod {
 impl Rod {
     /// A rod at rest, of `length_m` in `cells`, two at least, against a hub that sends back
     /// `hub` of the pressure that arrives: `(Z_hub - Z)/(Z_hub + Z)`, -1 to 1.
-    pub fn new(rubber: Rubber, length_m: f64, cells: usize, hub: f64) -> Self {
+    pub(crate) fn new(rubber: Rubber, length_m: f64, cells: usize, hub: f64) -> Self {
         let dt_s = length_m / cells as f64 / rubber.front_speed_m_s();
         Self {
             rubber,
@@ -51,7 +51,7 @@ impl Rod {
 
     /// The tread at rest on a hub of the arm's alloy, in `cells`. That has a hundred times
     /// the impedance of rubber and sends back 0.98 of a wave.
-    pub fn tread(rubber: Rubber, cells: usize) -> Self {
+    pub(crate) fn tread(rubber: Rubber, cells: usize) -> Self {
         let alloy = Beam::drive_arm();
         let hub = (alloy.e_pa * alloy.rho_kg_m3).sqrt();
         let reflection = (hub - rubber.impedance()) / (hub + rubber.impedance());
@@ -59,17 +59,17 @@ impl Rod {
     }
 
     /// Length of a step, s: that in which the front crosses a cell.
-    pub fn step_s(&self) -> f64 {
+    pub(crate) fn step_s(&self) -> f64 {
         self.dt_s
     }
 
     /// Pressure on the hub, Pa, in the step just taken.
-    pub fn hub_pa(&self) -> f64 {
+    pub(crate) fn hub_pa(&self) -> f64 {
         self.hub_pa
     }
 
     /// Pressure in a cell, Pa: P + Q of (35).
-    pub fn pressure_pa(&self, cell: usize) -> f64 {
+    pub(crate) fn pressure_pa(&self, cell: usize) -> f64 {
         self.inward[cell] + self.outward[cell]
     }
 
@@ -78,7 +78,7 @@ impl Rod {
     /// Equation: `rho v_t = -sigma_x`, `eps_t = -v_x`,
     /// `sigma + p_1 sigma_t = q_0 eps + q_1 eps_t`, as waves P and Q with
     /// `sigma = P + Q`, `rho c v = P - Q`, c the speed of the front. Cost: a few operations a cell.
-    pub fn step(&mut self, face_pa: f64) {
+    pub(crate) fn step(&mut self, face_pa: f64) {
         self.relax();
         self.carry(face_pa);
         self.relax();

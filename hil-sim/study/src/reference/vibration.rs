@@ -16,21 +16,21 @@ use super::beam::{Beam, BeamError, Ends, Shape, Tip};
 mod tests;
 
 /// First constrained mode of the rig, Hz. Published (its Fig. 19).
-pub const CONSTRAINED_HZ: f64 = 276.0;
+pub(crate) const CONSTRAINED_HZ: f64 = 276.0;
 
 /// Seventh free mode of the rig, Hz: the first that deforms it. Published (its Fig. 19).
-pub const FREE_HZ: f64 = 163.0;
+pub(crate) const FREE_HZ: f64 = 163.0;
 
 /// Loss factor of the bolted arm. Chosen: hysteresis of the alloy is a hundredth of
 /// that; joints of small machines lie at 0.01 to 0.04.
 const LOSS_FACTOR: f64 = 0.02;
 
 /// Modes that move; those beyond, above 20 kHz, follow the force at once.
-pub const MODES: usize = 6;
+pub(crate) const MODES: usize = 6;
 
 /// The drive arm, clamped at the pillar, with what is at the wheel as a point mass.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Arm {
+pub(crate) struct Arm {
     pub beam: Beam,
     pub tip: Tip,
     /// Angle between arm and pillar, rad, with the wheel on the outermost wall.
@@ -48,7 +48,7 @@ impl Arm {
     /// the first elastic one without (Rayleigh), and 163 Hz is below 276. The free rig
     /// therefore bends elsewhere first, in a part that its base holds when it is bolted
     /// down, of which nothing is published.
-    pub fn of(rig: &Rig) -> Result<Self, BeamError> {
+    pub(crate) fn of(rig: &Rig) -> Result<Self, BeamError> {
         let beam = Beam::drive_arm();
         let mass_kg = beam.tip_mass_for(CONSTRAINED_HZ)?;
         let geometry = &rig.rig;
@@ -60,7 +60,7 @@ impl Arm {
     }
 
     /// Deflection at the tip per static force there, m/N: `L^3/(3 EI)`, and the spring.
-    pub fn compliance_m_per_n(&self) -> f64 {
+    pub(crate) fn compliance_m_per_n(&self) -> f64 {
         let bending = 3.0 * self.beam.bending_stiffness_n_m2() / self.beam.length_m.powi(3);
         1.0 / (bending + self.tip.spring_n_per_m)
     }
@@ -70,7 +70,7 @@ impl Arm {
     }
 
     /// Its motion at the tip by its first `count` modes.
-    pub fn modal(&self, count: usize) -> Result<Modal, BeamError> {
+    pub(crate) fn modal(&self, count: usize) -> Result<Modal, BeamError> {
         Ok(Modal::new(&self.shapes(count)?, 0.5 * self.loss_factor, self.compliance_m_per_n()))
     }
 
@@ -80,7 +80,7 @@ impl Arm {
     /// the loss factor, and the static deflection of the modes left out; (56) has the
     /// amplitude of a normalised mode, which has none. Without a spring at the tip.
     /// Range: frequencies up to a few modes. Error: 1e-6 below 600 Hz.
-    pub fn receptance_m_per_n(&self, frequency_hz: f64) -> Result<Complex<f64>, BeamError> {
+    pub(crate) fn receptance_m_per_n(&self, frequency_hz: f64) -> Result<Complex<f64>, BeamError> {
         let loss = Complex::new(1.0, self.loss_factor);
         let square = (TAU * frequency_hz).powi(2);
         let mut sum = Complex::from(self.compliance_m_per_n()) / loss;
@@ -107,7 +107,7 @@ struct Oscillator {
 /// Motion of the tip over time as a sum of modes, each exact for a force that runs in
 /// straight pieces.
 #[derive(Clone, Debug)]
-pub struct Modal {
+pub(crate) struct Modal {
     oscillators: Vec<Oscillator>,
     /// Static deflection per force that the modes left out give, m/N.
     rest_compliance: f64,
@@ -135,7 +135,7 @@ impl Modal {
     ///
     /// Equation: with `f = F_0 + F' t` the motion is `(f - 2 zeta F'/w)/w^2` and a
     /// damped oscillation. Range: zeta from 0 to below 1. Error: rounding.
-    pub fn step(&mut self, force_n: f64, dt_s: f64) {
+    pub(crate) fn step(&mut self, force_n: f64, dt_s: f64) {
         let rate = (force_n - self.force_n) / dt_s;
         for oscillator in &mut self.oscillators {
             oscillator.step(self.force_n, rate, dt_s);
@@ -143,7 +143,7 @@ impl Modal {
         self.force_n = force_n;
     }
 
-    pub fn deflection_m(&self) -> f64 {
+    pub(crate) fn deflection_m(&self) -> f64 {
         let modes: f64 = self.oscillators.iter().map(|o| o.gain * o.state.0).sum();
         modes + self.rest_compliance * self.force_n
     }

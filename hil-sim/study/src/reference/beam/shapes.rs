@@ -14,7 +14,7 @@ const PIECES: usize = 4096;
 
 /// One mode's shape, of unit modal mass and with its tip on the positive side.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Shape {
+pub(crate) struct Shape {
     pub mode: Mode,
     length_m: f64,
     /// Wave leaving end A, wave leaving end B.
@@ -28,7 +28,7 @@ impl Shape {
     /// Equation: `W(x) = [1 1] f(x) xi_A^+ + [1 1] f(L - x) eta_B^-` (55).
     /// Range: 0 to the length. Error: 1e-8 of the largest deflection while
     /// `beta_l > 0.1`; a soft spring's rigid mode below that cancels the more.
-    pub fn at(&self, x_m: f64) -> f64 {
+    pub(crate) fn at(&self, x_m: f64) -> f64 {
         self.waves(x_m / self.length_m).re
     }
 
@@ -41,7 +41,7 @@ impl Shape {
     }
 
     /// Deflection at end B, 1/sqrt(kg).
-    pub fn tip(&self) -> f64 {
+    pub(crate) fn tip(&self) -> f64 {
         self.at(self.length_m)
     }
 
@@ -56,7 +56,12 @@ impl Beam {
     ///
     /// Equation: `xi_A^+` is what `R_A f R_B f` leaves as it is (53),
     /// `eta_B^- = R_B f xi_A^+`; scaled to `int rho A W^2 dx + m W(L)^2 = 1`.
-    pub fn shapes(&self, ends: Ends, tip: Tip, count: usize) -> Result<Vec<Shape>, BeamError> {
+    pub(crate) fn shapes(
+        &self,
+        ends: Ends,
+        tip: Tip,
+        count: usize,
+    ) -> Result<Vec<Shape>, BeamError> {
         let modes = self.modes(ends, tip, count)?;
         let (mass, spring) = self.ratios(tip)?;
         let end_a = ends.end_a().reflection();

@@ -13,7 +13,7 @@
 use nalgebra::{Complex, Matrix2};
 
 /// What acts on a pair (propagating, evanescent) of wave amplitudes.
-pub type Transfer = Matrix2<Complex<f64>>;
+pub(crate) type Transfer = Matrix2<Complex<f64>>;
 
 const I: Complex<f64> = Complex::new(0.0, 1.0);
 
@@ -24,7 +24,7 @@ const fn c(re: f64, im: f64) -> Complex<f64> {
 
 /// An ideal end of a beam.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum End {
+pub(crate) enum End {
     /// No deflection, no slope.
     Clamped,
     /// No deflection, no moment.
@@ -35,7 +35,7 @@ pub enum End {
 
 impl End {
     /// Reflection matrix R of this end, the same at either end of the beam (eqs 48-54).
-    pub fn reflection(self) -> Transfer {
+    pub(crate) fn reflection(self) -> Transfer {
         match self {
             Self::Clamped => Transfer::new(-I, c(-1.0, -1.0), c(-1.0, 1.0), I),
             Self::Pinned => -Transfer::identity(),
@@ -58,16 +58,16 @@ impl End {
 /// `z = W''' / (k^3 W)`, as a direction `(cos, sin)` so that neither free (z = 0)
 /// nor pinned (z infinite) is a special case.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Load {
+pub(crate) struct Load {
     shear: f64,
     deflection: f64,
 }
 
 impl Load {
     /// Nothing there: `W''' = 0`.
-    pub const FREE: Self = Self { shear: 1.0, deflection: 0.0 };
+    pub(crate) const FREE: Self = Self { shear: 1.0, deflection: 0.0 };
     /// An immovable pin: `W = 0`.
-    pub const PINNED: Self = Self { shear: 0.0, deflection: 1.0 };
+    pub(crate) const PINNED: Self = Self { shear: 0.0, deflection: 1.0 };
 
     /// Mass and spring to ground at the tip.
     ///
@@ -79,7 +79,7 @@ impl Load {
     ///
     /// Units: `mass` in beam masses (`m / rho A L`), `spring` in `EI / L^3`.
     /// Range: finite, `beta_l > 0`.
-    pub fn mass_and_spring(mass: f64, spring: f64, beta_l: f64) -> Self {
+    pub(crate) fn mass_and_spring(mass: f64, spring: f64, beta_l: f64) -> Self {
         let z = spring / beta_l.powi(3) - mass * beta_l;
         let norm = z.hypot(1.0);
         Self { shear: 1.0 / norm, deflection: z / norm }
@@ -92,7 +92,7 @@ impl Load {
     /// `R = [[2z - (1+i), 2], [-2i, 2z + (1+i)]] / ((1-i) - 2z)`.
     /// [`End::Free`] at z = 0, [`End::Pinned`] as |z| grows. The denominator has no
     /// real zero.
-    pub fn reflection(self) -> Transfer {
+    pub(crate) fn reflection(self) -> Transfer {
         let (q, p) = (self.shear, 2.0 * self.deflection);
         let numerator = Transfer::new(c(p - q, -q), c(2.0 * q, 0.0), c(0.0, -2.0 * q), c(p + q, q));
         numerator / self.denominator()
@@ -104,7 +104,7 @@ impl Load {
 }
 
 /// Propagation matrix over the beam, `f(L)` (eq 44).
-pub fn propagation(beta_l: f64) -> Transfer {
+pub(crate) fn propagation(beta_l: f64) -> Transfer {
     Transfer::new(
         Complex::from_polar(1.0, -beta_l),
         c(0.0, 0.0),
@@ -127,7 +127,7 @@ pub fn propagation(beta_l: f64) -> Transfer {
 /// Range: `beta_l > 0`; nothing overflows, the exponentials only fall.
 /// Error: a few units of rounding of a number of order one.
 /// Cost: three products and one determinant of 2 x 2 complex matrices.
-pub fn frequency_function(a: End, b: Load, beta_l: f64) -> f64 {
+pub(crate) fn frequency_function(a: End, b: Load, beta_l: f64) -> f64 {
     let f = propagation(beta_l);
     let round_trip = a.reflection() * f * b.reflection() * f;
     let phase = Complex::from_polar(1.0, beta_l) * a.denominator() * b.denominator();

@@ -4,6 +4,7 @@
 //! `(R - distance) cos psi` and `(R - distance) sin psi`, distance being `y/cos psi`,
 //! `d/sin psi` and `(y - h)/cos psi`, over the angles at which they are positive.
 
+use hil_sim::plant::ring::RingParameters;
 use interstage::rig::Rig;
 use proptest::prelude::*;
 
@@ -14,29 +15,19 @@ use crate::reference::case::Resolution;
 /// An elastic wheel and a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Elastic {
-    /// Undeformed radius, mm.
-    radius_mm: f64,
-    width_mm: f64,
-    /// Stiffness per area, N/mm^3 (1e9 Pa/m).
-    stiffness: f64,
+    ring: RingParameters,
     step_height_mm: f64,
 }
 
 /// Forces of the wall on the wheel, N.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Forces {
-    /// Away from the lower wall, by that wall.
-    floor_n: f64,
-    /// Away from the lower wall, by face and top.
+    /// Away from the lower wall.
+    radial_n: f64,
+    /// Of this by face and top.
     step_n: f64,
     /// Against the motion.
     axial_n: f64,
-}
-
-impl Forces {
-    fn radial_n(&self) -> f64 {
-        self.floor_n + self.step_n
-    }
 }
 
 impl Elastic {
@@ -48,9 +39,9 @@ impl Elastic {
     /// Units: mm, N. Range: x in (-R, 0), y in (h, 2R). Error: rounding of the bracketed
     /// differences, 1e-15 `k R^2 L`.
     fn forces(&self, x_mm: f64, y_mm: f64) -> Forces {
-        let (r, h) = (self.radius_mm, self.step_height_mm);
+        let (r, h) = (self.ring.radius_mm, self.step_height_mm);
         let (d, y, z) = (-x_mm, y_mm, y_mm - h);
-        let scale = self.stiffness * r * self.width_mm;
+        let scale = self.ring.k_inf * r * self.ring.width_mm;
         // Angles at which rays meet root and corner, and at which depth ends.
         let (root, corner) = (d.atan2(y), d.atan2(z));
         let half = |height: f64| (height / r).min(1.0).acos();
@@ -68,7 +59,7 @@ impl Elastic {
         let top = between(&flat(z), corner, half(z));
         let top_axial = between(&|psi: f64| -r * psi.cos() + z * psi.cos().ln(), corner, half(z));
         Forces {
-            floor_n: scale * floor,
+            radial_n: scale * (floor + face + top),
             step_n: scale * (face + top),
             axial_n: scale * (floor_axial + face_axial + top_axial),
         }
@@ -78,15 +69,15 @@ impl Elastic {
     ///
     /// Bisection to the last bit: the force falls steadily as the centre rises.
     fn height_mm(&self, x_mm: f64, preload_n: f64) -> f64 {
-        let (low, high) = (self.step_height_mm, 2.0 * self.radius_mm);
-        bisect(low, high, 1.0, |y| preload_n - self.forces(x_mm, y).radial_n())
+        let (low, high) = (self.step_height_mm, 2.0 * self.ring.radius_mm);
+        bisect(low, high, 1.0, |y| preload_n - self.forces(x_mm, y).radial_n)
     }
 
     /// The gap, mm: at lift-off the centre is at y = R, so that
     /// `step_n(x, R) = P` gives x and `sqrt(x^2 + R^2) - R` the gap. None if even with
     /// the face under the centre the step does not carry the preload.
     fn gap_mm(&self, preload_n: f64) -> Option<f64> {
-        let r = self.radius_mm;
+        let r = self.ring.radius_mm;
         let carried = |x: f64| self.forces(x, r).step_n;
         // At x = 0 the floor ahead is gone and the quarter ahead of the top carries.
         let nearest = -1e-9 * r;
@@ -106,13 +97,7 @@ fn without_memory(speed_mm_s: f64, preload_n: f64) -> (ReferenceCase, Elastic) {
         resolution: Resolution { elements: 5760, stride_mm: 0.005, step_s: 2e-4 },
         ..ReferenceCase::new(rig, speed_mm_s, preload_n)
     };
-    let ring = case.ring();
-    let elastic = Elastic {
-        radius_mm: ring.radius_mm,
-        width_mm: ring.width_mm,
-        stiffness: ring.k_inf,
-        step_height_mm: case.rig.rig.step_height_mm,
-    };
+    let elastic = Elastic { ring: case.ring(), step_height_mm: case.rig.rig.step_height_mm };
     (case, elastic)
 }
 
@@ -172,7 +157,7 @@ fn a_stiff_tread_climbs_as_a_rigid_wheel() {
     assert!((rigid - 64.6).abs() < 0.05);
     let mut last = f64::INFINITY;
     for stiffness in [1.0, 1e1, 1e2, 1e3, 1e4] {
-        elastic.stiffness = stiffness;
+        elastic.ring.k_inf = stiffness;
         let lift_x = -((elastic.gap_mm(100.0).unwrap() + 25.0).powi(2) - 625.0).sqrt();
         let short = rigid - elastic.forces(lift_x, 25.0).axial_n;
         assert!(short > 0.0 && short < last, "{short}");
@@ -327,7 +312,7 @@ proptest! {
         }
         let scale = 0.6044 * 25.0 * 28.0 * h;
         let forces = elastic.forces(x, y);
-        prop_assert!((forces.radial_n() - scale * radial).abs() < 1e-6 * (1.0 + radial));
+        prop_assert!((forces.radial_n - scale * radial).abs() < 1e-6 * (1.0 + radial));
         prop_assert!((forces.axial_n - scale * axial).abs() < 1e-6 * (1.0 + radial));
     }
 }

@@ -1,15 +1,30 @@
 //! The rod against d'Alembert, against the dispersion relation, and its energy.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{LN_10, TAU};
 
 use nalgebra::Complex;
 use proptest::prelude::*;
 
 use super::*;
+use crate::reference::ReferenceCase;
+use crate::reference::rubber::THICKNESS_MM;
 
+/// Long-term modulus and density of material sheets.
 fn rubber(stiffening: f64, tau_s: f64) -> Rubber {
     let (relaxed_pa, instant_pa) = (4.8e6, 4.8e6 * stiffening);
     Rubber { relaxed_pa, instant_pa, tau_s, density_kg_m3: 1140.0 }
+}
+
+/// The rubber of the sheets with this largest loss tangent at this frequency, Hz:
+/// `tan delta = (s - 1)/(2 sqrt s)` at `omega p_1 = 1/sqrt s`, s = E_2/q_0.
+fn of_sheets(loss_tangent: f64, at_hz: f64) -> Rubber {
+    let root = loss_tangent + loss_tangent.hypot(1.0);
+    rubber(root * root, 1.0 / (TAU * at_hz * root))
+}
+
+/// Speed of a slow wave, m/s: `sqrt(q_0/rho)`.
+fn slow_m_s(rubber: Rubber) -> f64 {
+    (rubber.relaxed_pa / rubber.density_kg_m3).sqrt()
 }
 
 /// One step; the inward speed of the face in it, m/s.
@@ -93,7 +108,7 @@ fn measured(rubber: Rubber, omega: f64, cells: usize) -> Complex<f64> {
     let (a, b) = (cells / 20, cells / 10);
     let period = TAU / omega;
     // Long enough for the transient to fade, then one period of correlation.
-    let settle = (3.0 * length / rubber.slow_speed_m_s() + 30.0 * rubber.tau_s).max(4.0 * period);
+    let settle = (3.0 * length / slow_m_s(rubber) + 30.0 * rubber.tau_s).max(4.0 * period);
     let mut t = 0.0;
     while t < settle {
         t += rod.step_s();
@@ -116,6 +131,38 @@ fn measured(rubber: Rubber, omega: f64, cells: usize) -> Complex<f64> {
     // Half a wave on: the phase is within a quarter turn of -pi.
     let phase = ratio.arg().rem_euclid(TAU) - TAU;
     Complex::new(-phase / distance, -ratio.norm().ln() / distance)
+}
+
+#[test]
+fn the_tread_is_crossed_in_a_tenth_of_a_millisecond_and_next_to_nothing_is_lost() {
+    // No wave fades as fast as the front, the limit of short ones.
+    let loss_db = |rubber| -dispersion(rubber, 1e9).im * 20.0 / LN_10 * THICKNESS_MM * 1e-3;
+    for (loss, hz) in [(0.1, 10.0), (0.1, 100.0), (0.25, 10.0), (0.25, 100.0)] {
+        let rubber = of_sheets(loss, hz);
+        for speed in [slow_m_s(rubber), rubber.front_speed_m_s()] {
+            let transit_ms = THICKNESS_MM / speed;
+            assert!((0.08..0.15).contains(&transit_ms), "{transit_ms}");
+        }
+        let loss = loss_db(rubber);
+        assert!(loss > 0.0 && loss < 0.16, "{loss} dB");
+    }
+    // The fitted tread stiffens more, so its front is faster.
+    let fitted = Rubber::of(&ReferenceCase::first());
+    assert!((THICKNESS_MM / slow_m_s(fitted) - 0.1228).abs() < 1e-4);
+    assert!((THICKNESS_MM / fitted.front_speed_m_s() - 0.0598).abs() < 1e-4);
+    assert!(loss_db(fitted) < 0.002);
+}
+
+#[test]
+fn the_sheets_loss_is_met_at_its_frequency() {
+    let rubber = of_sheets(0.25, 100.0);
+    let tangent = |omega: f64| {
+        let modulus = (omega / dispersion(rubber, omega)).powi(2) * rubber.density_kg_m3;
+        modulus.im / modulus.re
+    };
+    let peak = TAU * 100.0;
+    assert!((tangent(peak) - 0.25).abs() < 1e-12);
+    assert!(tangent(0.9 * peak) < 0.25 && tangent(1.1 * peak) < 0.25);
 }
 
 #[test]
