@@ -7,7 +7,7 @@
 
 mod accept;
 pub mod bringup;
-pub(crate) mod campaign;
+pub mod campaign;
 pub mod capture;
 mod compare;
 mod completions;

@@ -2,7 +2,7 @@
 //! reports on them.
 
 pub mod bringup;
-pub(crate) mod campaign;
+pub mod campaign;
 pub mod cli;
 pub(crate) mod compare;
 pub mod envelope;

@@ -265,6 +265,8 @@ const fn is_of_board(event: Event) -> bool {
 mod tests {
     use std::sync::OnceLock;
 
+    use interstage::units::Millimetres;
+
     use super::*;
     use crate::scenario::Scenario;
     use crate::session::{self, RunningRig};
@@ -303,22 +305,15 @@ mod tests {
         let mut session = session::Session::new(&scenario, session::Options::ROWS).unwrap();
         let mut bytes = Vec::new();
         for _ in 0..2 {
-            let mut left = Some(interstage::supervise::Command::Start);
-            for _ in 0..4000 {
-                let given = if session.mode() == Mode::Idle { left.take() } else { None };
-                session.step(given).unwrap();
-            }
+            let operator = session::once(scenario.run.direction);
+            session::drive(&mut session, 4.0, operator, |_, _, _| false).unwrap();
             bytes.extend(session.take_log(false));
             session.restart();
         }
         let run = Run::of_stream(&bytes);
         assert_eq!(run.counts.restarts, 1);
         let place = run.since_boot(1).restart().and_then(|restart| restart.place());
-        assert!(
-            place
-                .is_some_and(|place| place.position > interstage::units::Millimetres::from_num(10)),
-            "{place:?}"
-        );
+        assert!(place.is_some_and(|place| place.position > Millimetres::from_num(10)), "{place:?}");
         let result = replay(&run, &Rig::prototype()).unwrap();
         assert!(result.difference.is_none() && result.blind == 0, "{result:?}");
         // Ticks of both starts have the same numbers but different plans.

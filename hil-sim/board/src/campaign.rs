@@ -19,7 +19,7 @@ use crate::chip::Pin;
 use crate::chip::map::PARAMETER_SETS;
 use crate::error::BoardError;
 use crate::fault_injector::Saving;
-use crate::log::Strings;
+use crate::log::{Line, Strings};
 use crate::peripherals::rcc::Cause;
 use crate::run::store;
 use hil_sim::faults::campaign::{AFTER_S, Instant, Trial, Twin};
@@ -57,7 +57,7 @@ pub struct Firmware<'a> {
 
 /// A running board, seen from outside.
 pub struct Board<'a> {
-    bench: Bench<'a>,
+    pub(crate) bench: Bench<'a>,
     /// Mean commands at its bridges over the last millisecond.
     drives: Drives,
     /// Address of the first snapshot of the restart record.
@@ -67,10 +67,12 @@ pub struct Board<'a> {
     speed: Q16,
     /// Milliseconds since the last start.
     up: u64,
-    restarts: usize,
+    pub(crate) restarts: usize,
     /// A command that the console has not accepted yet.
     pending: Option<Command>,
     frames: Vec<u8>,
+    /// Lines of the log in the last millisecond.
+    pub(crate) lines: Vec<Line>,
     /// Lines of the log about a restart.
     restart_lines: usize,
     /// The log about parameters since the last start.
@@ -99,6 +101,7 @@ impl<'a> Board<'a> {
             restarts: 0,
             pending: None,
             frames: Vec::new(),
+            lines: Vec::new(),
             restart_lines: 0,
             parameters: Parameters::default(),
             image_s: None,
@@ -203,6 +206,7 @@ impl RunningRig for Board<'_> {
                 self.image_s.get_or_insert(self.bench.time_s());
             }
         }
+        self.lines = lines;
         output.telemetry.mode = self.mode;
         output.telemetry.speed_ref = self.speed;
         Ok(output)
@@ -291,8 +295,7 @@ pub fn watched(
     found.finding = match board.restarts {
         _ if unrecorded.is_some() => Finding::Undetected,
         0 if !of_image => found.finding,
-        _ if restart.is_some() => Finding::Found,
-        _ => Finding::Undetected,
+        _ => Finding::of_restart(injection, restart),
     };
     if board.image_s.is_some() {
         found.end = "hold".into();

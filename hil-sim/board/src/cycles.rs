@@ -10,17 +10,14 @@ use crate::core::Meter;
 use crate::error::ImageError;
 use crate::image::{ARGUMENTS, Image};
 use crate::spread::Spread;
-use hil_sim::record::starter;
 use hil_sim::scenario::{Direction, Scenario};
-use hil_sim::session::{Options, RunError, RunningRig, Session};
+use hil_sim::session::{Options, RunError, RunningRig, Session, is_over, longest_s, once};
 
 /// Package and binary of the measuring image.
 pub const IMAGE: (&str, &str) = ("interstage-images", "measure");
 
 /// Address at which the image writes its outputs.
 const ANSWERS: u32 = ARGUMENTS + 0x1000;
-/// Longest run recorded, ticks.
-const LONGEST: usize = 120_000;
 
 /// A step of a script.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
@@ -113,20 +110,15 @@ pub struct Recorded {
 /// Runs a scenario in software and records each tick.
 pub fn record(scenario: &Scenario) -> Result<Vec<Recorded>, RunError> {
     let mut session = Session::new(scenario, Options::default())?;
-    let mut start = Some(starter(scenario.run.direction));
-    let mut ticks = Vec::new();
-    while ticks.len() < LONGEST {
-        let command = if session.mode() == Mode::Idle { start.take() } else { None };
-        let sensors = session.sense();
+    let (mut operator, mut ticks) = (once(scenario.run.direction), Vec::new());
+    while !is_over(session.mode()) && session.time_s() < longest_s(&scenario.rig) {
+        let (command, sensors) = (operator(session.mode()), session.sense());
         let now = ticks.len() as u32;
         let given = Given::of(&Input { now, sensors, command, ..Input::default() });
         let output = session.advance(&sensors, command)?;
         let smooth = matches!(output.telemetry.mode, Mode::Run(_, Leg::Cruise))
             && output.telemetry.stage == ContactStage::Continuous;
         ticks.push(Recorded { given, taken: Taken::of(&output), smooth });
-        if matches!(session.mode(), Mode::Complete(_) | Mode::FaultHold(_)) {
-            break;
-        }
     }
     Ok(ticks)
 }

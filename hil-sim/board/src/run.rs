@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use super::bench::Bench;
+use super::campaign::{Board, Firmware};
 use super::elf::RAM;
 use super::error::BoardError;
 use super::load::{Gathered, Load};
@@ -10,19 +10,17 @@ use super::log::{Line, Strings};
 use super::machine::Machine;
 use interstage::params::{CompileError, slots};
 use interstage::rig::Rig;
+use interstage::supervise::Mode;
 
 use crate::chip::map::PARAMETER_SETS;
 use hil_sim::faults::sets;
 use hil_sim::firmware::Footprint;
 use hil_sim::params::set_of;
-use hil_sim::record::{JoinedLog, LogLine, Recording, letter, starter};
+use hil_sim::record::{JoinedLog, LogLine, Recording};
 use hil_sim::scenario::injection::{Injection, Target};
 use hil_sim::scenario::{ControllerKind, Scenario};
-use hil_sim::session::longest_s;
+use hil_sim::session::{RunningRig, drive, is_over, longest_s, once};
 
-/// Numbers of the modes in which a run is over.
-const COMPLETE: u8 = 10;
-const FAULT_HOLD: u8 = 11;
 /// Time for which the board runs on after arrival, ms.
 const AFTER: u32 = 100;
 /// The same after a restart under way, s: it reports the cause and is idle again.
@@ -84,58 +82,53 @@ pub fn run(
     check(scenario)?;
     let footprint = Footprint::of_elf(elf)?;
     let strings = Strings::of(elf)?;
-    let mut bench = Bench::new(elf, &strings, scenario)?;
-    store(&mut bench.machine, scenario)?;
+    let mut board = Board::new(Firmware { elf, strings: &strings }, scenario)?;
     if options.wait_states {
-        bench.machine.count_waits()?;
+        board.bench.machine.count_waits()?;
     }
-    let (mut log, mut lines_of_log) = (JoinedLog::new(0), Vec::new());
-    let (mut start, mut idle) = (Some(letter(starter(scenario.run.direction))), false);
-    let started = Instant::now();
-    let mut after = AFTER;
-    let mut gathered = Gathered::default();
-    let mut stream = Vec::new();
-    let mut ends_at = longest_s(&scenario.rig);
-    while bench.time_s() < ends_at && after > 0 {
-        let waited = start.is_some();
-        let restarts = bench.machine.restarts().len();
-        log.add(bench.plant.truth());
-        let t_s = bench.time_s();
-        let (_, lines) = bench.step()?;
-        for line in &lines {
-            watch(bench.time_s(), line);
-            idle |= line.text.contains("mode: idle");
+    let (mut log, mut lines_of_log, mut stream) = (JoinedLog::new(0), Vec::new(), Vec::new());
+    let (started, mut gathered, mut waits) = (Instant::now(), Gathered::default(), true);
+    let (mut restarts, mut ends_at, mut after) = (0, f64::INFINITY, AFTER);
+    let (mut t_s, mut truth) = (0.0, *board.plant().truth());
+    let operator = once(scenario.run.direction);
+    drive(&mut board, longest_s(&scenario.rig), operator, |board, _, _| {
+        log.add(&truth);
+        for line in &board.lines {
+            watch(board.time_s(), line);
             let level = if line.level.is_empty() { "" } else { " " };
             let text = format!("{}{level}{}", line.level, line.text);
             lines_of_log.push(LogLine { t_s, text });
         }
-        match start {
-            Some(letter) if idle && bench.send(letter)? => {
-                start = None;
-                gathered.begin(&mut bench.machine);
-            }
-            _ => gathered.gather(&mut bench.machine),
-        }
-        let frames = bench.take_frames();
-        if bench.machine.restarts().len() > restarts {
+        (t_s, truth) = (board.time_s(), *board.plant().truth());
+        if board.restarts > std::mem::replace(&mut restarts, board.restarts) {
             log.restarted();
-            if !waited {
+            if !waits {
                 // It starts with the drive at rest and waits for a command.
-                ends_at = ends_at.min(bench.time_s() + AFTER_RESTART_S);
+                ends_at = ends_at.min(t_s + AFTER_RESTART_S);
             }
         }
+        // The command follows.
+        if waits && board.mode() == Mode::Idle {
+            waits = false;
+            gathered.begin(&mut board.bench.machine);
+        } else {
+            gathered.gather(&mut board.bench.machine);
+        }
+        let frames = board.take_log(false);
         log.read(&frames);
         stream.extend(frames);
-        if matches!(log.mode(), Some(COMPLETE | FAULT_HOLD)) {
-            after -= 1;
-        }
-    }
+        after -= u32::from(is_over(board.mode()));
+        after == 0 || t_s >= ends_at
+    })?;
     let wall_s = started.elapsed().as_secs_f64();
-    let arrived = (log.mode() == Some(COMPLETE)).then_some(scenario.run.direction.into());
-    let of = (scenario, &bench.plant);
+    let arrived = match board.mode() {
+        Mode::Complete(direction) => Some(direction),
+        _ => None,
+    };
+    let of = (scenario, board.plant());
     let recording = log.finish("board", of, arrived, options.rows, wall_s);
     let recording = Recording { log: lines_of_log, stream, ..recording };
-    let machine = bench.machine;
+    let machine = board.bench.machine;
     let stack = stack_used(&machine)?;
     let load = gathered.close(&machine, &footprint, stack);
     Ok(Ran { recording, load, machine })

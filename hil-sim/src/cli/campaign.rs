@@ -146,7 +146,7 @@ impl CampaignArgs {
         E: Send,
         Failure: From<E>,
     {
-        let ((what, steps), cases) = (campaign.steps, campaign.cases.len());
+        let cases = campaign.cases.len();
         let places = self.shard.places(cases);
         if places.is_empty() {
             let shard = self.shard;
@@ -163,10 +163,7 @@ impl CampaignArgs {
                 return Err(Failure::input(why));
             }
             None => {
-                let stop = Stop::by_ctrl_c();
-                let bar = progress::bar(what, (places.len() * steps) as u64);
-                let watch = Watch { done: &|| bar.advance(1), stop: &|| stop.is_wanted() };
-                let lines = campaign.lines(&places, watch)?.into_iter();
+                let lines = lines(&campaign, &places)?.into_iter();
                 let line = |(at, line)| serde_json::to_value(line).map(|line| (at, line));
                 (lines.map(line).collect::<Result<_, _>>().map_err(Failure::run)?, command())
             }
@@ -184,6 +181,25 @@ impl CampaignArgs {
         let part = (done < cases).then_some(Part { version, command, parameters, cases, lines });
         Ok(Found { outcome, part, partial: (done < of).then_some(Partial { done, of }) })
     }
+}
+
+/// The lines of the cases at these places, up to Ctrl-C.
+fn lines<C: Sync, L: Send, O, E: Send>(
+    campaign: &Campaign<'_, C, L, O, E>,
+    places: &[usize],
+) -> Result<Vec<(usize, L)>, E> {
+    let (what, steps) = campaign.steps;
+    let (stop, bar) = (Stop::by_ctrl_c(), progress::bar(what, (places.len() * steps) as u64));
+    campaign.lines(places, Watch { done: &|| bar.advance(1), stop: &|| stop.is_wanted() })
+}
+
+/// The outcome of all cases; none if Ctrl-C ends it before.
+pub fn complete<C: Sync, L: Send, O, E: Send>(
+    campaign: Campaign<'_, C, L, O, E>,
+) -> Result<Option<O>, E> {
+    let places: Vec<usize> = (0..campaign.cases.len()).collect();
+    let lines = lines(&campaign, &places)?;
+    Ok((lines.len() == places.len()).then(|| campaign.outcome(lines)))
 }
 
 impl<O> Found<O> {

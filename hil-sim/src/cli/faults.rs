@@ -12,7 +12,6 @@ use crate::campaign::{Column, Frame, column};
 use crate::faults::campaign::{
     Case, FaultCampaign, Instant, MatrixRow, Outcome as Matrix, Twin, twin, watched,
 };
-use crate::progress;
 use crate::scenario::{Scenario, nearest_word};
 use crate::table::{counted, width, wrapped};
 
@@ -96,15 +95,9 @@ pub fn carry_out<E: Display + Send>(
 where
     Failure: From<E>,
 {
-    let rigs = if args.campaign.is_given() {
-        Vec::new()
-    } else {
-        let bar = progress::bar("runs without a fault", args.count);
-        campaign.rigs(twin, &|| bar.advance(1))?
-    };
     let target = if args.target == "board" { "board" } else { "sil" };
     let parameters = campaign.scenario.to_toml();
-    let found = args.campaign.carry_out(parameters, campaign.on(target, &rigs, watched))?;
+    let found = args.campaign.carry_out(parameters, campaign.on(target, twin, watched))?;
     let outcome = &found.outcome;
     let row = |line: &MatrixRow| {
         let mut row = json!(line);

@@ -6,31 +6,26 @@ mod twin;
 
 use std::borrow::Cow;
 
-use interstage::rig::Rig;
 use interstage::supervise::{Command, Leg, Mode};
+use interstage::units::Direction;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::judge::{Finding, Judge};
 use crate::campaign::{Campaign, Watch};
 use crate::injector::FaultTimes;
+use crate::record::or_nan;
 use crate::scenario::Scenario;
-use crate::scenario::injection::{Injection, Kind, Target};
-use crate::session::{self, Options, RunError, RunningRig, Session};
+use crate::scenario::injection::{Injection, Target, restarts};
+use crate::session::{Options, RunError, RunningRig, Session, drive, longest_s};
 
 pub use case::Case;
 pub use matrix::{MatrixRow, MedianAndWorst, Outcome};
-pub use twin::{Operator, Twin};
+pub use twin::Twin;
+use twin::out_and_back;
 
 /// How long a run is watched after its end, s.
 pub const AFTER_S: f64 = 1.0;
-
-/// Longest run out and back, s: half of what one direction alone may take at the least useful
-/// speed, and three times the travel at cruise speed.
-pub(crate) fn longest_s(rig: &Rig) -> f64 {
-    let cruise_s = rig.rig.travel_mm / rig.drive.cruise_speed_mm_s;
-    (0.5 * session::longest_s(rig)).max(3.0 * cruise_s)
-}
 
 /// What became of one fault at one instant.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
@@ -60,6 +55,7 @@ pub struct Instant {
     /// Distance moved uncommanded, mm.
     pub motion_mm: f64,
     /// Largest gap over the reference gap.
+    #[serde(deserialize_with = "or_nan")]
     pub gap_part: f64,
     /// Which bounds of the mechanism were exceeded; empty if it was safe.
     pub harms: Vec<String>,
@@ -89,32 +85,29 @@ impl<'a> Trial<'a> {
         mut is_over: impl FnMut(&R, f64, Option<Command>, bool) -> bool,
     ) -> Result<Self, R::Error> {
         let injection = scenario.run.faults.first();
+        let resets = injection.is_some_and(|fault| fault.target == Target::Reset);
         let mut judge = Judge::new(scenario, rig.plant().truth());
-        let mut operator = Operator::default();
         let (mut during, mut over_s, mut worst_mm) = (None, 0.0, 0.0f64);
+        let (mut t_s, mut before, mut last) = (rig.time_s(), rig.mode(), None);
         let longest_s = longest_s(&scenario.rig);
-        while rig.time_s() < longest_s {
-            let (t_s, before) = (rig.time_s(), rig.mode());
-            let command = if rig.is_free() { operator.command(before) } else { None };
-            let output = rig.step(command)?;
+        drive(rig, longest_s, out_and_back(resets), |rig, command, output| {
             let struck = rig.fault_times().struck_s.is_some();
-            if struck && during.is_none() {
-                during = Some(doing(before));
-                if injection.is_some_and(|fault| fault.target == Target::Reset) {
-                    operator.press_again();
-                }
+            if struck {
+                during.get_or_insert(doing(before));
             }
-            let truth = rig.plant().truth();
-            judge.look(t_s, &output, truth, struck || injection.is_none());
-            if rig.mode().moves() {
+            let (truth, mode) = (rig.plant().truth(), rig.mode());
+            judge.look(t_s, output, truth, struck || injection.is_none());
+            if mode.moves() {
                 worst_mm = worst_mm.max(truth.separation_mm);
             }
-            let over = is_over(rig, t_s, command, operator.over(rig.mode()));
+            last = command.or(last);
+            let out = mode == Mode::Complete(Direction::Deploy) && last != Some(Command::Retract);
+            let rests = last.is_some() && mode.is_at_rest() && !out;
+            let over = is_over(rig, t_s, command, rests);
             over_s = if over { over_s + 1e-3 } else { 0.0 };
-            if over && over_s >= after_s {
-                break;
-            }
-        }
+            (t_s, before) = (rig.time_s(), mode);
+            over && over_s >= after_s
+        })?;
         let crossings = rig.plant().ledger().crossings();
         let steps = rig.plant().parameters().wall.steps().len();
         let [out, back] = twin.gap_ref_mm;
@@ -179,56 +172,46 @@ pub struct FaultCampaign {
     pub cases: Vec<Case>,
 }
 
-/// Each rig and its run without a fault.
-pub(crate) type Rigs = Vec<(Scenario, Twin)>;
-
 impl FaultCampaign {
-    /// Runs each rig without a fault.
-    pub fn rigs<E: Send>(
-        &self,
-        twin: impl Fn(&Scenario) -> Result<Twin, E> + Sync,
-        done: &(dyn Fn() + Sync),
-    ) -> Result<Rigs, E> {
-        let rig = |instant: usize| {
-            let mut scenario = self.scenario.clone();
-            scenario.run.seed += 1 + instant as u64;
-            let twin = twin(&scenario)?;
-            done();
-            Ok((scenario, twin))
-        };
-        (0..self.instants).into_par_iter().map(rig).collect()
-    }
-
-    /// The campaign of every fault on each of these rigs on a target. A run that cannot be made
-    /// counts as undetected.
-    pub fn on<'a, E: std::fmt::Display>(
+    /// The campaign on a target, a rig a case: its run without a fault and, beside that, one with
+    /// each. A run with a fault that cannot be made counts as undetected.
+    pub fn on<'a, E: std::fmt::Display + Send + 'a>(
         &'a self,
         target: &'static str,
-        rigs: &'a Rigs,
+        twin: impl Fn(&Scenario) -> Result<Twin, E> + Sync + 'a,
         watched: impl Fn(&Scenario, &Twin) -> Result<Instant, E> + Sync + 'a,
-    ) -> Campaign<'a, Case, MatrixRow, Outcome, E> {
-        let row = move |case: &Case, watch: Watch| {
-            let one = |(instant, (rig, twin)): (usize, &(Scenario, Twin))| {
-                let scenario = case.scenario(rig, twin, instant);
-                let found = watched(&scenario, twin);
+    ) -> Campaign<'a, usize, Vec<Instant>, Outcome, E> {
+        let run = move |instant: &usize, watch: Watch| {
+            let mut rig = self.scenario.clone();
+            rig.run.seed += 1 + *instant as u64;
+            let twin = twin(&rig)?;
+            (watch.done)();
+            let one = |case: &Case| {
+                if (watch.stop)() {
+                    return None;
+                }
+                let scenario = case.scenario(&rig, &twin, *instant);
+                let found = watched(&scenario, &twin);
                 (watch.done)();
-                found.unwrap_or_else(|error| Instant {
+                Some(found.unwrap_or_else(|error| Instant {
                     seed: scenario.run.seed,
                     during: "at rest".into(),
                     end: "plant failed".into(),
                     harms: vec![error.to_string()],
                     ..Instant::default()
-                })
+                }))
             };
-            let instants: Vec<Instant> = rigs.par_iter().enumerate().map(one).collect();
-            Ok(Some(MatrixRow::of(case, &instants)))
+            Ok(self.cases.par_iter().map(one).collect())
         };
-        let fold = move |lines: Vec<(Case, MatrixRow)>| {
-            let rows = lines.into_iter().map(|(_, row)| row).collect();
-            Outcome::of(target, rows, self.instants)
+        let fold = move |lines: Vec<(usize, Vec<Instant>)>| {
+            let row = |(at, case): (usize, &Case)| {
+                MatrixRow::of(case, &lines.iter().map(|(_, line)| &line[at]).collect::<Vec<_>>())
+            };
+            Outcome::of(target, self.cases.iter().enumerate().map(row).collect(), lines.len())
         };
-        let steps = ("runs", self.instants);
-        Campaign { steps, cases: self.cases.clone(), run: Box::new(row), fold: Box::new(fold) }
+        let steps = ("runs", 1 + self.cases.len());
+        let cases = (0..self.instants).collect();
+        Campaign { steps, cases, run: Box::new(run), fold: Box::new(fold) }
     }
 }
 
@@ -254,28 +237,8 @@ pub fn twin(scenario: &Scenario) -> Result<Twin, RunError> {
 pub fn watched(scenario: &Scenario, twin: &Twin) -> Result<Instant, RunError> {
     let mut session = Session::new(scenario, Options::default())?;
     let trial = Trial::run(&mut session, scenario, twin, AFTER_S, |_, _, _, over| over)?;
-    let reset = scenario.run.faults.first().filter(|fault| fault.target == Target::Reset);
-    Ok(Instant {
-        restart: reset.map(|fault| match fault.kind {
-            Kind::Recorded => "reset by pin".into(),
-            _ => "reset by supply".into(),
-        }),
-        ..trial.found(trial.report().map(|(at_s, _)| at_s))
-    })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn there_is_time_for_both_directions_at_any_cruise_speed() {
-        let mut rig = Rig::prototype();
-        assert_eq!(longest_s(&rig), 60.0);
-        for (travel_mm, cruise_mm_s) in [(1000.0, 5.0), (160.0, 2.0), (80.0, 0.5)] {
-            (rig.rig.travel_mm, rig.drive.cruise_speed_mm_s) = (travel_mm, cruise_mm_s);
-            let both_s = 2.0 * travel_mm / cruise_mm_s;
-            assert!(longest_s(&rig) > 1.2 * both_s && session::longest_s(&rig) > 0.7 * both_s);
-        }
-    }
+    let fault = scenario.run.faults.first();
+    let restarts = fault.map_or(&[][..], |fault| restarts(fault.target, fault.kind));
+    let restart = restarts.first().map(|restart| (*restart).into());
+    Ok(Instant { restart, ..trial.found(trial.report().map(|(at_s, _)| at_s)) })
 }

@@ -12,12 +12,13 @@ use serde::{Deserialize, Serialize};
 use crate::plant::draw::STOP_ROOM_MM;
 use crate::plant::rig::Truth;
 use crate::plant::wall::touch_mm;
-use crate::scenario::injection::{Kind, Target, entry};
+use crate::scenario::injection::{Injection, Kind, Target, entry, restarts};
 use crate::scenario::{Scenario, StepAnomaly, TICK_S};
 
-/// Time within which 123 finds a wheel off its reference, s: two spans of the cross-check.
+/// Time within which 123 finds a wheel off its reference, s: two spans of the cross-check, which are
+/// the controller's on every rig.
 const OFF_REFERENCE_S: f64 = 0.012;
-/// Gap that a run may have, parts of the reference gap.
+/// Gap that a run may have, parts of the reference gap, which is the rig's.
 pub(crate) const GAP_PART: f64 = 1.1;
 /// Limits that report what the controller does about its task, not that anything is wrong.
 const OPERATIONAL: [Limit; 5] = [
@@ -47,6 +48,18 @@ pub enum Finding {
     Undetected,
 }
 
+impl Finding {
+    /// Of a fault that ended in this restart, or in a start that holds, if it was reported.
+    pub fn of_restart(fault: Option<&Injection>, reported: Option<&str>) -> Self {
+        let own = fault.map_or(&[][..], |fault| restarts(fault.target, fault.kind));
+        match reported {
+            None => Self::Undetected,
+            Some(said) if own.iter().any(|own| said.starts_with(own)) => Self::Found,
+            Some(_) => Self::Otherwise,
+        }
+    }
+}
+
 /// Bounds of the mechanism, which follow from the rig.
 #[derive(Clone, Copy, Debug, Default)]
 struct Bounds {
@@ -58,13 +71,21 @@ struct Bounds {
     end_mm: f64,
 }
 
+/// Distance in which the wheel coasts from the largest speed with the motor's time constant,
+/// `m v_0 / F_stall`, mm.
+pub fn coasts_mm(rig: &Rig) -> f64 {
+    let drive = &rig.drive;
+    let mass_kg = drive.reflected_mass_kg + rig.plant.moved_mass_kg;
+    let coasts_s = 1e-3 * mass_kg * drive.no_load_speed_mm_s / drive.stall_force_n;
+    drive.cruise_speed_mm_s * coasts_s
+}
+
 impl Bounds {
     /// - Preload: that at which 120 trips, of a sensor that reads too little by its stated error,
     ///   and what the screw adds at its full slew while the fault is confirmed and in its own dead
     ///   time and lag. The screw's stop, at 1.25 of the limit, is farther.
     /// - Motion: what the wheel may be off its reference before 123 is reported, and the distance
-    ///   in which it coasts from the largest speed with the motor's time constant,
-    ///   `m v_0 / F_stall`. A wheel that slips, or is torn where it carries, may slide off the corner
+    ///   in which it coasts. A wheel that slips, or is torn where it carries, may slide off the corner
     ///   it is on, by its run over that, `sqrt(R^2 - (R - h)^2)`, which no bridge can hold it on.
     ///   It may do so again: what it loses each time is counted from the farthest place.
     /// - Faster than its reference, along the command: what 123 lets pass of a wheel whose encoder
@@ -72,21 +93,18 @@ impl Bounds {
     ///   a step the gap bounds it. The reference counts as slowing by the profile.
     /// - Gap: as in a run that reports nothing. A wheel that slips lifts off as it slides, and the
     ///   reference is that of the table's steps alone.
-    /// - End: the room before the end stop, where a wheel ends whose encoder went wrong on the
+    /// - End: the room before the end stop, the same on every virtual rig, where a wheel ends whose encoder went wrong on the
     ///   last millimetres.
     fn of(rig: &Rig, slips: bool, strange_step: bool) -> Self {
         let (preload, drive, rig_mm) = (&rig.preload, &rig.drive, &rig.rig);
         let trips_n = preload.limit_n * (1.0 + OVERPRESSURE_PART) / (1.0 - rig.sense.preload_error);
         let late_s = f64::from(OVERPRESSURE_TICKS) * TICK_S + rig.preload_latency_s();
-        let mass_kg = drive.reflected_mass_kg + rig.plant.moved_mass_kg;
-        let coasts_s = 1e-3 * mass_kg * drive.no_load_speed_mm_s / drive.stall_force_n;
         let run_mm = touch_mm(rig_mm.wheel_radius_mm, rig_mm.step_height_mm);
         let off_mm = off_reference_mm(rig);
         let faster_mm_s = off_mm / OFF_REFERENCE_S;
-        let stops_mm = off_mm + drive.cruise_speed_mm_s * coasts_s;
         Self {
             preload_n: trips_n + preload.slew_n_per_s * late_s,
-            motion_mm: if slips { run_mm } else { stops_mm },
+            motion_mm: if slips { run_mm } else { off_mm + coasts_mm(rig) },
             faster_mm_s: faster_mm_s.min(drive.no_load_speed_mm_s - drive.cruise_speed_mm_s),
             slows_mm_s2: drive.acceleration_mm_s2,
             gap_part: if slips || strange_step { f64::INFINITY } else { GAP_PART },
@@ -303,22 +321,25 @@ mod tests {
     use interstage::tick::Entry;
     use interstage::units::{MotorCommand, Q16};
 
-    use crate::scenario::injection::Injection;
-
     use super::*;
 
     const RUN: Mode = Mode::Run(Direction::Deploy, Leg::Cruise);
 
-    /// A judge that has seen `ticks` of this mode at this reference and true speed, mm/s,
-    /// under this preload, N.
-    fn judged(mode: Mode, asked: f64, speed: f64, preload_n: f64, ticks: u32) -> Judge {
-        let mut truth =
-            Truth { preload_n, speed_mm_s: speed, rigid_mm_s: speed, ..Truth::default() };
-        let mut judge = Judge::new(&Scenario::default(), &truth);
-        let mut output = Output::default();
+    /// A judge of the prototype, so many times as large, as fast and as strong, that has seen this
+    /// mode at this reference and true speed, mm/s, under this preload, N, for 100 ms.
+    fn judged(scale: f64, mode: Mode, (asked, speed): (f64, f64), preload_n: f64) -> Judge {
+        let (mut scenario, mut output) = (Scenario::default(), Output::default());
+        let Rig { rig, preload, drive, .. } = &mut scenario.rig;
+        let forces = [&mut preload.limit_n, &mut preload.slew_n_per_s];
+        let speeds = [&mut drive.no_load_speed_mm_s, &mut drive.cruise_speed_mm_s];
+        let sizes = [&mut rig.wheel_radius_mm, &mut rig.travel_mm];
+        [forces, speeds, sizes].into_iter().flatten().for_each(|value| *value *= scale);
+        let (speed_mm_s, rigid_mm_s) = (speed, speed);
+        let mut truth = Truth { preload_n, speed_mm_s, rigid_mm_s, ..Truth::default() };
+        let mut judge = Judge::new(&scenario, &truth);
         output.telemetry.mode = mode;
         output.telemetry.speed_ref = Q16::from_num(asked);
-        for tick in 0..ticks {
+        for tick in 0..100 {
             truth.position_mm += speed * TICK_S;
             judge.look(f64::from(tick) * TICK_S, &output, &truth, true);
         }
@@ -327,39 +348,45 @@ mod tests {
 
     #[test]
     fn motion_is_uncommanded_beyond_its_reference_against_it_and_at_rest() {
-        // 0.11 mm and 2 counts in 12 ms are 12.36 mm/s.
-        assert!(judged(RUN, 8.0, 20.3, 40.0, 1000).motion_mm < 1e-9);
-        assert!((judged(RUN, 8.0, 30.36, 40.0, 100).motion_mm - 1.0).abs() < 0.01);
-        assert!((judged(RUN, 8.0, -8.0, 40.0, 100).motion_mm - 0.8).abs() < 0.01);
-        let hold = Mode::FaultHold(Fault::DriveStalled);
-        assert!((judged(hold, 0.0, 1.0, 40.0, 100).motion_mm - 0.1).abs() < 1e-9);
+        // 0.11 mm and 2 counts in 12 ms are 12.36 mm/s, with counts twice as long 15.56.
+        for (scale, more) in [(1.0, 12.36), (2.0, 15.56)] {
+            let moved_mm = |mode, asked, speed| judged(scale, mode, (asked, speed), 40.0).motion_mm;
+            assert!(moved_mm(RUN, 8.0, 7.94 + more) < 1e-9);
+            assert!((moved_mm(RUN, 8.0, 18.0 + more) - 1.0).abs() < 0.01);
+            assert!((moved_mm(RUN, 8.0, -8.0) - 0.8).abs() < 0.01);
+            let hold = Mode::FaultHold(Fault::DriveStalled);
+            assert!((moved_mm(hold, 0.0, 1.0) - 0.1).abs() < 1e-9);
+        }
     }
 
     #[test]
     fn a_harm_is_named() {
         let hold = Mode::FaultHold(Fault::Overpressure);
-        // 1.1 of 50 N by a sensor that reads 1.5 % too little, and 25 N/s for 10, 80 and 60 ms.
-        assert!(judged(hold, 0.0, 0.0, 59.5, 10).harms(1.0).is_empty());
-        assert!(judged(hold, 0.0, 0.0, 59.7, 10).harms(1.0)[0].starts_with("preload 59.7 N"));
-        assert!(judged(RUN, 8.0, 8.0, 40.0, 10).harms(1.0)[0].starts_with("not at rest"));
-        assert_eq!(judged(hold, 0.0, 0.0, 40.0, 10).harms(1.11), ["gap 1.11 of the reference"]);
-        let there = Mode::Complete(Direction::Deploy);
-        assert!(
-            judged(there, 0.0, 0.0, 40.0, 10).harms(1.0)[0].starts_with("80.0 mm from the end")
-        );
-        assert!(
-            judged(Mode::Complete(Direction::Retract), 0.0, 0.0, 40.0, 10).harms(1.0).is_empty()
-        );
+        let [out, back] = Direction::ALL.map(Mode::Complete);
+        // Motion: 0.15 and 0.46 mm, twice as large 0.19 and 1.85 mm.
+        for (scale, most_mm) in [(1.0, 0.61), (2.0, 2.03)] {
+            let judged = |mode, speed, part| judged(scale, mode, (0.0, speed), part * scale);
+            let harm = |mode, speed, part| judged(mode, speed, part).harms(1.0).concat();
+            // 1.1 of 50 N by a sensor that reads 1.5 % too little, and 25 N/s for 10, 80 and 60 ms.
+            assert_eq!(harm(hold, 0.0, 59.5) + &harm(back, 0.0, 40.0), "");
+            assert!(harm(hold, 0.0, 59.7).starts_with(&format!("preload {:.1} N", 59.7 * scale)));
+            assert_eq!(harm(hold, 9.9 * most_mm, 40.0), "not at rest at its end");
+            assert!(harm(hold, 10.1 * most_mm, 40.0).contains("mm uncommanded"));
+            assert_eq!(judged(hold, 0.0, 40.0).harms(1.11), ["gap 1.11 of the reference"]);
+            let far = format!("{:.1} mm from the end", 80.0 * scale);
+            assert!(harm(out, 0.0, 40.0).starts_with(&far));
+        }
     }
 
     #[test]
     fn what_is_not_reported_must_have_ended_well() {
         let back = Mode::Complete(Direction::Retract);
-        let good = judged(back, 0.0, 0.0, 40.0, 10);
+        let good = judged(1.0, back, (0.0, 0.0), 40.0);
         assert_eq!(good.finding(&[], 1.0, true), Finding::Tolerated);
         assert_eq!(good.finding(&[], 1.0, false), Finding::Undetected);
         assert_eq!(good.finding(&[], 1.3, true), Finding::Undetected);
-        assert_eq!(judged(RUN, 8.0, 8.0, 40.0, 10).finding(&[], 1.0, true), Finding::Undetected);
+        let moving = judged(1.0, RUN, (8.0, 8.0), 40.0);
+        assert_eq!(moving.finding(&[], 1.0, true), Finding::Undetected);
         let mut limited = good.clone();
         limited.limits.push((0.1, Limit::StepLate.code()));
         assert_eq!(limited.finding(&[], 1.3, true), Finding::Limited);
@@ -405,6 +432,10 @@ mod tests {
                 assert_eq!(found, if names < 200 { Finding::Found } else { Finding::Limited });
             }
         }
+        let falls = Injection::at(Target::Supply, Kind::Off, 0.0, 0.0);
+        let [own, other] = ["reset by supply", "reset by watchdog"]
+            .map(|said| Finding::of_restart(Some(&falls), Some(said)));
+        assert_eq!((own, other), (Finding::Found, Finding::Otherwise));
         // What the controller does about its task names nothing.
         assert_eq!(finding(&[205]), (Finding::Tolerated, None));
     }

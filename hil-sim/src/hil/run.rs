@@ -10,9 +10,9 @@ use interstage::units::Tick;
 
 use super::{HilError, HostLine};
 use crate::probe::{LOG, Port, TEXT};
-use crate::record::{JoinedLog, Recording, starter};
+use crate::record::{JoinedLog, Recording};
 use crate::scenario::{ControllerKind, Scenario, TICK_S};
-use crate::session::{drives, initial_rig, longest_s, read};
+use crate::session::{drives, initial_rig, is_over, longest_s, once, read};
 
 /// Ticks between two polls of the log; the channel holds a hundred.
 const POLL: Tick = 16;
@@ -44,15 +44,12 @@ pub fn run(
     Planner::try_build(&scenario.rig)?;
     let (mut log, mut stream) = (JoinedLog::new(FIRST), asked.rows.then(Vec::new));
     let mut line = HostLine::begin(port)?;
-    let mut start = Some(starter(scenario.run.direction));
-    let started = Instant::now();
+    let (started, mut operator) = (Instant::now(), once(scenario.run.direction));
     let (mut tick, mut mode) = (FIRST, Mode::Boot);
-    let over = |mode: Mode| matches!(mode, Mode::Complete(_) | Mode::FaultHold(_));
     let mut given = Given::default();
-    while !over(mode) && f64::from(tick - FIRST) * TICK_S < longest_s(&scenario.rig) {
+    while !is_over(mode) && f64::from(tick - FIRST) * TICK_S < longest_s(&scenario.rig) {
         let codes = read(&mut sensors, &plant);
-        let command = if mode == Mode::Idle { start.take() } else { None };
-        given = Given::codes(codes.sensors, codes.bridges).with(command);
+        given = Given::codes(codes.sensors, codes.bridges).with(operator(mode));
         let taken = line.tick(tick, given)?;
         mode = taken.mode().unwrap_or(mode);
         log.add(plant.truth());

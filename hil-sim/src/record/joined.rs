@@ -78,11 +78,6 @@ impl JoinedLog {
         self.identity.as_ref()
     }
 
-    /// Number of the mode in the latest tick.
-    pub fn mode(&self) -> Option<u8> {
-        self.ticks.back().map(|(.., tick)| tick.mode)
-    }
-
     /// Number of the first tick that is not in the log although the plant is there.
     pub(crate) fn lacks(&self) -> Option<Tick> {
         let there = (0..).zip(&self.ticks).take_while(|(at, tick)| *at == tick.0).count();

@@ -124,8 +124,8 @@ impl<R: RunningRig> Virtual<R> {
 
     /// Runs a millisecond; false if the run is over.
     fn tick(&mut self) -> Result<bool, R::Error> {
-        let over = matches!(self.rig.mode(), Mode::Complete(_) | Mode::FaultHold(_));
-        if !self.attended && (over || self.rig.time_s() >= self.longest_s) {
+        let over = session::is_over(self.rig.mode()) || self.rig.time_s() >= self.longest_s;
+        if !self.attended && over {
             self.left = self.left.saturating_sub(1);
         }
         if self.left == 0 {

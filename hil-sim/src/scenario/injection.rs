@@ -4,7 +4,7 @@ mod catalogue;
 
 use serde::{Deserialize, Serialize};
 
-pub use catalogue::{CATALOGUE, Entry, HARDWARE, entry};
+pub use catalogue::{CATALOGUE, Entry, HARDWARE, entry, restarts};
 use interstage::sense::raw::SensorId;
 
 use crate::table::label;

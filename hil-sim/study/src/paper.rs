@@ -47,13 +47,8 @@ pub struct Study {
     pub(crate) claims: Vec<Claim>,
 }
 
-/// Deployments that [`regenerate`] runs.
-pub fn runs() -> usize {
-    cases().len() * published::RUNS
-}
-
 /// Cases of all experiments, each once.
-fn cases() -> Vec<Case> {
+pub fn cases() -> Vec<Case> {
     let all: [&[Case]; 5] = [
         &cases::cases(),
         &Variable::Preload.cases(),
@@ -70,10 +65,8 @@ fn cases() -> Vec<Case> {
     unique
 }
 
-/// Runs the experiments, computes theory and simulation, and judges the claims. `done`
-/// is called after each deployment.
-pub fn regenerate(done: &(dyn Fn() + Sync)) -> Result<Study> {
-    let experiments = experiment::run_all(&cases(), done)?;
+/// Computes theory and simulation beside the experiments of all [`cases`], and judges the claims.
+pub fn regenerate(experiments: &[Experiment]) -> Result<Study> {
     let find = |wanted: &[Case]| -> Vec<&Experiment> {
         let of = |case: &Case| experiments.iter().find(|e| e.case == *case);
         wanted.iter().filter_map(of).collect()
@@ -103,9 +96,9 @@ pub fn regenerate(done: &(dyn Fn() + Sync)) -> Result<Study> {
         cases::verdicts(at_study),
         amplitudes::verdicts(&amplitudes, at_study),
         modes::verdicts(&modes),
-        sweeps::verdicts(&preload, &speed, &experiments),
+        sweeps::verdicts(&preload, &speed, experiments),
         transitions::verdicts(at_rig),
-        hold::verdicts(&hold, &experiments, &speed.gap),
+        hold::verdicts(&hold, experiments, &speed.gap),
     ];
     Ok(Study { figures, claims: claims::Said::read()?.judged(&verdicts.concat())? })
 }

@@ -47,7 +47,9 @@ fn the_committed_data_are_what_this_build_makes() {
     if !super::long() {
         return;
     }
-    let study = paper::regenerate(&|| {}).expect("the study can be regenerated");
+    let experiments = paper::experiment::campaign(&paper::cases()).complete(&|| {});
+    let study = paper::regenerate(&experiments.expect("the rigs run"))
+        .expect("the study can be regenerated");
     let made: Value = serde_json::from_str(&paper::json(&study).unwrap()).unwrap();
     let kept: Value = serde_json::from_str(&doc("paper/paper.json")).unwrap();
     assert_eq!(verdicts(&made), verdicts(&kept), "verdicts that changed; see `cargo rig paper`");

@@ -1,6 +1,7 @@
 //! The campaign of faults at a few instants each: nothing undetected, nothing unsafe, and urgent
 //! faults are found at once. `cargo rig faults` is the complete campaign.
 
+use crate::common::overridden;
 use hil_sim::faults::campaign::{Case, FaultCampaign, MatrixRow, Outcome, twin, watched};
 use hil_sim::scenario::Scenario;
 use hil_sim::scenario::injection::{Injection, Kind, Target};
@@ -11,8 +12,7 @@ use interstage::sense::raw::SensorId;
 fn campaign_on(scenario: Scenario, instants: usize, wanted: impl Fn(&str) -> bool) -> Outcome {
     let cases = Case::all().into_iter().filter(|case| wanted(&case.name())).collect();
     let campaign = FaultCampaign { scenario, instants, cases };
-    let rigs = campaign.rigs(twin, &|| {}).expect("runs without a fault");
-    campaign.on("sil", &rigs, watched).complete(&|| {}).expect("a campaign")
+    campaign.on("sil", twin, watched).complete(&|| {}).expect("a campaign")
 }
 
 fn campaign(instants: usize, wanted: impl Fn(&str) -> bool) -> Outcome {
@@ -97,12 +97,8 @@ fn an_encoder_that_counts_too_few_is_not_taken_for_a_load() {
     for (seed, at_s) in [(32, 1.211), (35, 1.147)] {
         let mut scenario = Scenario::default();
         scenario.run.seed = seed;
-        scenario.run.faults = vec![Injection::at(
-            Target::Sensor(SensorId::WheelEncoder),
-            Kind::Gain,
-            at_s,
-            2.0 / 3.0,
-        )];
+        let encoder = Target::Sensor(SensorId::WheelEncoder);
+        scenario.run.faults = vec![Injection::at(encoder, Kind::Gain, at_s, 2.0 / 3.0)];
         let summary = run(&scenario, Options::default()).expect("a run").summary;
         let fault = summary.faults.first().expect("a fault");
         assert!(fault.code == 125 && fault.t_s < at_s + 1.0, "{fault:?}");
@@ -145,19 +141,15 @@ fn a_log_without_a_reader_does_not_change_the_run() {
     assert!(gone.stream.len() < clean.stream.len() / 2);
 }
 
-/// A rig of this travel at 5 mm/s.
-fn slow(travel_mm: u32) -> Scenario {
-    let sets = [format!("rig.travel_mm={travel_mm}"), "drive.cruise_speed_mm_s=5".to_owned()];
-    Scenario::default().with(&sets).expect("in range")
-}
-
 #[test]
 fn a_long_travel_at_a_low_speed_is_given_its_time() {
+    let slow =
+        |travel, steps| overridden("prototype", &["drive.cruise_speed_mm_s=5", travel, steps]);
     // 200 s, and 60 s each way.
-    let steps = ["rig.step_positions_mm=[200, 500, 800]".to_owned()];
-    let slowly = slow(1000).with(&steps).expect("in range");
-    let summary = run(&slowly, Options::default()).expect("a run").summary;
+    let out = slow("rig.travel_mm=1000", "rig.step_positions_mm=[200, 500, 800]");
+    let summary = run(&out, Options::default()).expect("a run").summary;
     assert!(summary.completed && summary.duration_s > Some(190.0), "{summary:?}");
-    let outcome = campaign_on(slow(300), 1, |name| name == "log gone");
+    let both = slow("rig.travel_mm=300", "rig.step_positions_mm=[18, 40, 62]");
+    let outcome = campaign_on(both, 1, |name| name == "log gone");
     assert_eq!((outcome.undetected, outcome.unheld), (0, 0), "{outcome:#?}");
 }

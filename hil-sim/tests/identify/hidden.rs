@@ -11,8 +11,7 @@ use hil_sim::plant::rig::VirtualRig;
 use hil_sim::plant::sensors::Sensors;
 use hil_sim::scenario::TICK_S;
 use hil_sim::scenario::{ControllerKind, Scenario};
-use hil_sim::session::{Options, RunningRig, Session, drives};
-use interstage::supervise::{Command, Mode};
+use hil_sim::session::{Options, RunningRig, Session, drives, is_over, once};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -126,12 +125,9 @@ fn log(index: usize, wide: &Scenario, zeros: (f64, f64)) -> Record {
     let session = Session::new(&scenario, Options::default()).expect("a sound scenario");
     let mut session = session.with_plant(|plant, own| (*plant, *own) = (rig, sensors));
     let (mut reader, mut samples) = (Reader::new(&scenario), Vec::new());
-    let mut start = Some(Command::Start);
-    while samples.len() < LONGEST
-        && !matches!(session.mode(), Mode::Complete(_) | Mode::FaultHold(_))
-    {
-        let command = if session.mode() == Mode::Idle { start.take() } else { None };
-        let frame = session.sense();
+    let mut operator = once(scenario.run.direction);
+    while samples.len() < LONGEST && !is_over(session.mode()) {
+        let (command, frame) = (operator(session.mode()), session.sense());
         let output = session.advance(&frame, command).expect("a sound plant");
         let mut sample = reader.sample(&frame, &drives(output.drive, output.preload));
         sample.preload_n += zeros.0;

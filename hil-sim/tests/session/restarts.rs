@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::common::{DIRECTIONS, end_mm, opposite, scenario, starter};
 use hil_sim::scenario::{Direction, Scenario};
-use hil_sim::session::{Options, RunningRig, Session};
+use hil_sim::session::{self, Options, RunningRig, Session, once};
 use hil_sim::testing::long;
 use interstage::fault::{Fault, Limit};
 use interstage::restart::{Reset, Restart};
@@ -95,16 +95,10 @@ fn resumed(
     then: Direction,
 ) -> (f64, Mode) {
     let mut session = session(seed, direction);
-    let mut left = Some(starter(direction));
-    for _ in 0..after {
-        let given = if session.mode() == Mode::Idle { left.take() } else { None };
-        session.step(given).expect("runs");
-    }
-    if kept {
-        session.restart()
-    } else {
-        session.reboot()
-    }
+    let after_s = f64::from(after) * 1e-3;
+    session::drive(&mut session, after_s, once(direction), |_, _, _| false).expect("runs");
+    let restart = if kept { Session::restart } else { Session::reboot };
+    restart(&mut session);
     let at_mm = session.plant().truth().position_mm;
     finish(&mut session, then);
     // A place that is called unconfirmed and is off is no false alarm.

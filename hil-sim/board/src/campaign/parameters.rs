@@ -90,11 +90,11 @@ pub(super) fn judged(
     };
     let restart = if held { Some(why) } else { board.restart().filter(|_| saving.is_some()) };
     if held {
-        (finding, end) = (Finding::Found, "hold");
+        (finding, end) = (Finding::of_restart(Some(injection), restart), "hold");
     } else if lost || saving.is_some() && restart.is_none() {
         finding = Finding::Undetected;
     } else if saving.is_some() && finding == Finding::Tolerated {
-        finding = Finding::Found;
+        finding = Finding::of_restart(Some(injection), restart);
     }
     Ok(Instant {
         at_s: board.fault_times().struck_s,

@@ -10,34 +10,32 @@ use super::{Board, reports};
 use crate::chip::map::PARAMETER_SETS;
 use crate::error::BoardError;
 use crate::peripherals::rcc::Cause;
+use hil_sim::faults::judge::coasts_mm;
 use hil_sim::plant::rig::Truth;
 use hil_sim::scenario::Scenario;
-use hil_sim::session::RunningRig;
+use hil_sim::session::{RunningRig, drive, longest_s};
 
-/// Most motion from the reset to the command, mm: the wheel coasts when its motor loses power. An axle
-/// that moves on the rubber of a wheel that stands is held.
-const MOTION_MM: f64 = 0.5;
+// Times of chip and firmware, the same on every rig.
 /// Longest time from a hang to the cut of the bridges, s. If another task than the tick hangs,
 /// the run stays under control until the task has been missed for 50 ms; 80 ms later the system
 /// timer finds that the watchdog was not refreshed.
 const HUNG_S: f64 = 0.131;
-/// Most change of the preload in the hold, relative: the rubber relaxes, the gears hold.
-const PRELOAD_PART: f64 = 0.25;
-/// The same, absolute, N.
-const PRELOAD_N: f64 = 3.0;
-/// Largest error of the recorded position, mm: that of the estimate, and a tick's travel.
-const RECORD_MM: f64 = 2.0;
 /// Oldest record, ticks before the reset.
 const RECORD_TICKS: usize = 3;
 /// From the supply's warning, or from the hang, to the reset, ticks.
 const FALLS_TICKS: usize = 2;
 const WATCHDOG_TICKS: usize = 250;
-/// Largest distance from the end of travel on arrival, mm.
-const ARRIVED_MM: f64 = 1.0;
-/// Longest run to either end, ms.
-const RUN_MS: u32 = 60_000;
 /// A fault hold takes no reset before it has lasted 100 ms.
-const HOLD_MS: u32 = 150;
+const HOLD_S: f64 = 0.15;
+
+// Parts of what the rig has.
+/// Most change of the preload in the hold, relative: the rubber relaxes, the gears hold.
+const PRELOAD_PART: f64 = 0.25;
+/// Largest error of the recorded position, over the tolerance of a step: within it the estimate
+/// finds the next one, and the rubber winds up by less than another one and a half.
+const RECORD_TOLERANCES: f64 = 2.5;
+/// The same of the distance from the end of travel on arrival, where the rubber has unwound.
+const ARRIVED_TOLERANCES: f64 = 1.25;
 
 /// The plant and the pins around a reset.
 #[derive(Default)]
@@ -97,11 +95,16 @@ impl Hold {
         let hung_mm = (reset.position_mm - struck.position_mm).abs();
         let hung_n = (reset.preload_n - struck.preload_n).abs();
         let preload_n = (last.preload_n - reset.preload_n).abs();
-        let most_mm = HUNG_S * scenario.rig.drive.cruise_speed_mm_s + MOTION_MM;
-        let most_n = HUNG_S * scenario.rig.preload.slew_n_per_s + PRELOAD_N;
-        let changed_n = PRELOAD_N.max(PRELOAD_PART * reset.preload_n.abs());
+        // The wheel coasts when its motor loses power, and so does the screw. An axle that moves on
+        // the rubber of a wheel that stands is held.
+        let rig = &scenario.rig;
+        let (coasts_mm, slew) = (coasts_mm(rig), rig.preload.slew_n_per_s);
+        let coasts_n = slew * rig.preload_latency_s();
+        let most_mm = HUNG_S * rig.drive.cruise_speed_mm_s + coasts_mm;
+        let most_n = HUNG_S * slew + coasts_n;
+        let changed_n = coasts_n.max(PRELOAD_PART * reset.preload_n.abs());
         let bounds = [
-            (motion_mm <= MOTION_MM, format!("moved by {motion_mm:.2} mm after the reset")),
+            (motion_mm <= coasts_mm, format!("moved by {motion_mm:.2} mm after the reset")),
             (hung_mm <= most_mm, format!("ran on for {hung_mm:.2} mm")),
             (hung_n <= most_n, format!("preload went on by {hung_n:.1} N")),
             (preload_n <= changed_n, format!("preload changed by {preload_n:.1} N")),
@@ -111,7 +114,7 @@ impl Hold {
     }
 
     /// Defect of the record.
-    fn record(&self, cause: Cause, restart: Option<&Restart>) -> Option<String> {
+    fn record(&self, cause: Cause, restart: Option<&Restart>, most_mm: f64) -> Option<String> {
         let Some(restart) = restart else { return Some("no record".to_owned()) };
         let fail = |what: &str| Some(format!("record: {what}: {restart}"));
         let (reset, later) = match cause {
@@ -134,7 +137,7 @@ impl Hold {
             return fail("of another time");
         }
         let at = self.positions_mm[tick.min(ticks - 1)];
-        if (snapshot.position.to_num::<f64>() - at).abs() > RECORD_MM {
+        if (snapshot.position.to_num::<f64>() - at).abs() > most_mm {
             return fail(&format!("not at {at:.2} mm"));
         }
         match (cause, restart.crash.map(|crash| crash.stopped)) {
@@ -158,7 +161,8 @@ impl Hold {
         };
         // The first power-up is reported as well.
         let reports = reports(&board.frames);
-        let unrecorded = self.record(cause, reports.get(1).or(reports.first()));
+        let most_mm = RECORD_TOLERANCES * scenario.rig.rig.step_tolerance_mm;
+        let unrecorded = self.record(cause, reports.get(1).or(reports.first()), most_mm);
         let mut harms = self.harms(scenario);
         harms.extend(next_run(board, scenario)?);
         let mut stored = vec![0; self.place.len()];
@@ -173,29 +177,22 @@ impl Hold {
 /// Runs the drive to an end, to the other one first if it does not know its position; returns
 /// the harm.
 fn next_run(board: &mut Board<'_>, scenario: &Scenario) -> Result<Option<String>, BoardError> {
+    let (rig, longest_s) = (&scenario.rig.rig, longest_s(&scenario.rig));
     let mut direction = Direction::ALL[(scenario.run.seed % 2) as usize];
     for _ in 0..2 {
-        let command = match direction {
-            Direction::Deploy => Command::Start,
-            Direction::Retract => Command::Retract,
+        let (command, end_mm) = match direction {
+            Direction::Deploy => (Command::Start, rig.travel_mm),
+            Direction::Retract => (Command::Retract, 0.0),
         };
-        board.step(Some(command))?;
-        let mut left = false;
-        for _ in 0..RUN_MS {
-            board.step(None)?;
+        let (mut command, mut left) = (Some(command), false);
+        let operator = |_| command.take();
+        drive(board, longest_s, operator, |board, _, _| {
             left |= !matches!(board.mode, Mode::Idle | Mode::Complete(_));
-            let arrived = board.mode == Mode::Complete(direction);
-            if arrived || left && board.mode.is_at_rest() {
-                break;
-            }
-        }
+            board.mode == Mode::Complete(direction) || left && board.mode.is_at_rest()
+        })?;
         if board.mode == Mode::Complete(direction) {
-            let end_mm = match direction {
-                Direction::Deploy => scenario.rig.rig.travel_mm,
-                Direction::Retract => 0.0,
-            };
             let at_mm = board.plant().truth().position_mm;
-            let far = (at_mm - end_mm).abs() > ARRIVED_MM;
+            let far = (at_mm - end_mm).abs() > ARRIVED_TOLERANCES * rig.step_tolerance_mm;
             return Ok(far.then(|| format!("says it arrived at {at_mm:.2} mm")));
         }
         let lost = [Fault::PositionUnknown, Fault::PlaceUnconfirmed].map(Mode::FaultHold);
@@ -204,16 +201,9 @@ fn next_run(board: &mut Board<'_>, scenario: &Scenario) -> Result<Option<String>
         }
         // As the faults' texts advise: the other direction.
         direction = direction.opposite();
-        for _ in 0..HOLD_MS {
-            board.step(None)?;
-        }
-        board.step(Some(Command::Reset))?;
-        for _ in 0..RUN_MS {
-            if board.mode == Mode::Idle {
-                break;
-            }
-            board.step(None)?;
-        }
+        drive(board, HOLD_S, |_| None, |_, _, _| false)?;
+        let mut reset = Some(Command::Reset);
+        drive(board, longest_s, |_| reset.take(), |board, _, _| board.mode == Mode::Idle)?;
     }
     let at_mm = board.plant().truth().position_mm;
     Ok(Some(format!("did not arrive after the reset: {:?}, {at_mm:.2} mm", board.mode)))

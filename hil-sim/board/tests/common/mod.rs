@@ -50,10 +50,9 @@ pub(crate) fn ran(scenario: &Scenario, rows: bool) -> Ran {
 pub(crate) fn tried(cases: Vec<Case>, instants: usize) -> Outcome {
     let firmware = Firmware { elf: elf(), strings: strings() };
     let campaign = FaultCampaign { scenario: Scenario::default(), instants, cases };
-    let rigs = campaign.rigs(|scenario| campaign::twin(firmware, scenario), &|| {});
+    let twin = |scenario: &Scenario| campaign::twin(firmware, scenario);
     let watched = |scenario: &Scenario, twin: &Twin| campaign::watched(firmware, scenario, twin);
-    let outcome = campaign.on("board", &rigs.expect("rigs"), watched).complete(&|| {});
-    let outcome = outcome.expect("a campaign");
+    let outcome = campaign.on("board", twin, watched).complete(&|| {}).expect("a campaign");
     let failures: Vec<_> = outcome.matrix.iter().flat_map(|line| &line.failures).collect();
     assert_eq!((outcome.undetected, outcome.unheld), (0, 0), "{failures:#?}");
     outcome
@@ -262,13 +261,12 @@ impl Board {
 
     /// The report of a start, during which nothing moves.
     pub(crate) fn report(&mut self) -> Restart {
-        let mut lines = self.log.len();
+        let lines = self.log.len();
         for _ in 0..3000 {
             self.assert_off(1);
             if self.log[lines..].iter().any(|line| line.contains("mode: idle")) {
                 break;
             }
-            lines = self.log.len();
         }
         let reports = campaign::reports(&std::mem::take(&mut self.frames));
         *reports.last().expect("a report")

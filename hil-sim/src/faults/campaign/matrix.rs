@@ -73,11 +73,11 @@ impl MatrixRow {
     }
 
     /// The row of a fault.
-    pub(crate) fn of(case: &Case, instants: &[Instant]) -> Self {
+    pub(crate) fn of(case: &Case, instants: &[&Instant]) -> Self {
         let count = |finding| instants.iter().filter(|i| i.finding == finding).count();
         let codes = counts(instants.iter().filter_map(|i| i.code));
         let failed = |i: &&Instant| i.finding == Finding::Undetected || !i.harms.is_empty();
-        let failures: Vec<Instant> = instants.iter().filter(failed).cloned().collect();
+        let failures = instants.iter().copied().filter(failed).cloned().collect();
         let latency = MedianAndWorst::of(instants.iter().filter_map(|i| i.latency_ms));
         let unheld = instants.iter().filter(|i| !i.harms.is_empty()).count();
         Self {

@@ -72,39 +72,26 @@ impl Twin {
 /// Ticks that the drive rests at the far end.
 const DWELL_TICKS: u32 = 100;
 
-#[derive(Clone, Debug, Default)]
-pub struct Operator {
-    started: bool,
-    turned: bool,
-    rested: u32,
-}
-
-impl Operator {
-    /// The command of a tick in which the drive is in this mode.
-    pub(crate) fn command(&mut self, mode: Mode) -> Option<Command> {
-        if mode == Mode::Idle && !self.started {
-            self.started = true;
-            return Some(if self.turned { Command::Retract } else { Command::Start });
-        }
-        if mode == Mode::Complete(Direction::Deploy) && !self.turned {
-            self.rested += 1;
-            if self.rested > DWELL_TICKS {
-                self.turned = true;
-                return Some(Command::Retract);
+/// An operator who deploys and, after arrival, retracts. `again`: who gives the last command again
+/// after a restart.
+pub(super) fn out_and_back(again: bool) -> impl FnMut(Mode) -> Option<Command> {
+    let (mut last, mut given, mut rested) = (Command::Start, false, 0);
+    move |mode| {
+        match mode {
+            Mode::Boot | Mode::SelfTest | Mode::Zero if again => given = false,
+            Mode::Idle if !given => {
+                given = true;
+                return Some(last);
             }
+            Mode::Complete(Direction::Deploy) if last == Command::Start => {
+                rested += 1;
+                if rested > DWELL_TICKS {
+                    last = Command::Retract;
+                    return Some(last);
+                }
+            }
+            _ => {}
         }
         None
-    }
-
-    /// The controller has restarted: the last command is given again.
-    pub(crate) const fn press_again(&mut self) {
-        self.started = false;
-    }
-
-    /// Whether it is over: at rest, and no further command comes.
-    pub(crate) fn over(&self, mode: Mode) -> bool {
-        self.started
-            && mode.is_at_rest()
-            && (mode != Mode::Complete(Direction::Deploy) || self.turned)
     }
 }

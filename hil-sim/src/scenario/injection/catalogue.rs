@@ -19,7 +19,7 @@ pub struct Entry {
     pub unit: &'static str,
     /// What happens.
     pub text: &'static str,
-    /// Codes that name it; none where a restart reports it.
+    /// Codes that name it; none where only [`restarts`] do.
     pub codes: &'static [u16],
 }
 
@@ -50,6 +50,27 @@ const fn codes(target: Target) -> &'static [u16] {
         // The button's other contact takes the supply from the motors, not from their bridges.
         StopWire => &[128, 129, 151],
         Debugger => &[101, 123, 216],
+        _ => &[],
+    }
+}
+
+/// Beginnings of the restarts or starts in the matrix that name such a fault; none if the
+/// controller goes on.
+pub const fn restarts(target: Target, kind: Kind) -> &'static [&'static str] {
+    use Target::*;
+    match (target, kind) {
+        // By the program, once the supply is back.
+        (Supply, Kind::Weak) | (Debugger, Kind::Reset) => &["reset by software"],
+        (Reset, Kind::Recorded) | (ResetPin, _) | (ParameterSave, Kind::Reset) => &["reset by pin"],
+        (Reset | Supply | ParameterSave, _) => &["reset by supply"],
+        (Processor | Timer | Interrupt | TickTask | ModelTask | JournalTask | LineTask, _)
+        | (WheelEncoderTask | PreloadSensorTask | CompressionSensorTask | ArmAngleTask, _) => {
+            &["reset by watchdog"]
+        }
+        (Image, Kind::BitErrors | Kind::TwoWrongBits) => &["image damaged"],
+        (ImageSet, _) => &["parameters damaged", "image damaged"],
+        (StoredSet, _) => &["parameters damaged"],
+        (OptionBytes, _) => &["flash: one bank"],
         _ => &[],
     }
 }

@@ -3,10 +3,10 @@
 use std::path::PathBuf;
 
 use super::{docs, failed, write};
-use crate::paper::{self, Study, page};
+use crate::paper::{self, Study, experiment, page};
+use hil_sim::cli::campaign::complete;
 use hil_sim::cli::failure::{Failure, Outcome};
 use hil_sim::cli::output::{self, WithFiles};
-use hil_sim::progress;
 use hil_sim::table::plain;
 
 /// Regenerates the figures of the study as theory, simulation and virtual rig, and judges
@@ -30,10 +30,9 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     // A directory that cannot be made is reported before the runs.
     std::fs::create_dir_all(&directory)
         .map_err(|error| Failure::input(format!("{}: {error}", directory.display())))?;
-    let study = {
-        let bar = progress::bar("deployments", paper::runs() as u64);
-        paper::regenerate(&|| bar.advance(1)).map_err(failed)?
-    };
+    let experiments = complete(experiment::campaign(&paper::cases())).map_err(failed)?;
+    let experiments = experiments.ok_or_else(|| Failure::run("interrupted: nothing is written"))?;
+    let study = paper::regenerate(&experiments).map_err(failed)?;
     let mut files: Vec<(&str, String)> =
         study.figures.iter().map(|figure| (figure.file.as_str(), figure.svg())).collect();
     files.push(("README.md", page::markdown(&study).map_err(failed)?));

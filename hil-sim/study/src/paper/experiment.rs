@@ -6,12 +6,10 @@
 //! vibration, for which the rig has no sensor, are what the plant did.
 
 use anyhow::Result;
-use interstage::supervise::{Command, Mode};
 use interstage::tick::Event;
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
-use rayon::prelude::*;
 
 use super::case::{Arms, Case};
 use super::history::{History, Instant};
@@ -20,16 +18,14 @@ use super::published::{LOG_S, RUNS, RUNS_OF_A_MEAN};
 use crate::figure::Series;
 use crate::reference::beam::BeamError;
 use crate::reference::vibration::Modal;
+use hil_sim::campaign::Campaign;
 use hil_sim::plant::rig::VirtualRig;
 use hil_sim::report::axis::extent;
 use hil_sim::scenario::Scenario;
-use hil_sim::session::{Options, RunningRig, Session};
+use hil_sim::session::{Options, RunningRig, Session, drive, is_over, longest_s, once};
 
 /// Crossings of a deployment.
 pub(super) const STAGES: usize = 3;
-
-/// Longest run, s: all of the travel in the slowest case, with room.
-const LONGEST_S: f64 = 60.0;
 
 /// A tick of the session, s.
 const TICK_S: f64 = 1e-3;
@@ -97,25 +93,25 @@ pub(super) fn marks(x: f64, all: &[f64], series: &mut Series) {
     series.range.extend(extent(all.iter().copied()).map(|(low, high)| (x, low, high)));
 }
 
-/// Runs every case on forty rigs; `done` is called after each run.
-pub(super) fn run_all(cases: &[Case], done: &(dyn Fn() + Sync)) -> Result<Vec<Experiment>> {
-    let pairs: Vec<(Case, u64)> =
-        cases.iter().flat_map(|case| (1..=RUNS as u64).map(move |seed| (*case, seed))).collect();
-    let runs: Vec<Run> = pairs
-        .par_iter()
-        .map(|&(case, seed)| {
-            let run = run(&case, seed);
-            done();
-            run
-        })
-        .collect::<Result<_>>()?;
-    let by_case = cases.iter().zip(runs.chunks(RUNS));
-    Ok(by_case.map(|(case, runs)| Experiment { case: *case, runs: runs.to_vec() }).collect())
-}
-
-/// One deployment of the rig that `seed` draws.
-pub(super) fn run(case: &Case, seed: u64) -> Result<Run> {
-    run_as(case, &case.scenario(seed))
+/// Every case on forty rigs.
+pub fn campaign(
+    cases: &[Case],
+) -> Campaign<'static, (Case, u64), Run, Vec<Experiment>, anyhow::Error> {
+    let seeds = |case: &Case| (1..=RUNS as u64).map(|seed| (*case, seed)).collect::<Vec<_>>();
+    let experiment = |all: &[((Case, u64), Run)]| Experiment {
+        case: all[0].0.0,
+        runs: all.iter().map(|(_, run)| run.clone()).collect(),
+    };
+    Campaign {
+        steps: ("deployments", 1),
+        cases: cases.iter().flat_map(seeds).collect(),
+        run: Box::new(|(case, seed), watch| {
+            let run = run_as(case, &case.scenario(*seed))?;
+            (watch.done)();
+            Ok(Some(run))
+        }),
+        fold: Box::new(move |runs| runs.chunks(RUNS).map(experiment).collect()),
+    }
 }
 
 /// One deployment of a case by the rig of this scenario.
@@ -123,10 +119,8 @@ pub(super) fn run_as(case: &Case, scenario: &Scenario) -> Result<Run> {
     let options = Options { speed: Some((case.speed_mm_s, true)), ..Options::default() };
     let mut session = Session::new(scenario, options)?;
     let mut watch = Watch::new(case, session.plant())?;
-    let mut start = Some(Command::Start);
-    while session.time_s() < LONGEST_S {
-        let command = if session.mode() == Mode::Idle { start.take() } else { None };
-        let output = session.step(command)?;
+    let operator = once(scenario.run.direction);
+    drive(&mut session, longest_s(&scenario.rig), operator, |session, _, output| {
         let telemetry = &output.telemetry;
         watch.run.stages[(telemetry.stage as usize).clamp(1, 6) - 1] = true;
         for entry in &output.events {
@@ -135,10 +129,8 @@ pub(super) fn run_as(case: &Case, scenario: &Scenario) -> Result<Run> {
             }
         }
         watch.look(telemetry.mode.moves(), telemetry.compression.to_num(), session.plant());
-        if matches!(session.mode(), Mode::Complete(_) | Mode::FaultHold(_)) {
-            break;
-        }
-    }
+        is_over(session.mode())
+    })?;
     Ok(watch.finish(case, session.plant()))
 }
 

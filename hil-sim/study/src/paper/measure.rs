@@ -136,6 +136,14 @@ mod tests {
     }
 
     #[test]
+    fn a_slow_case_is_run_to_its_end() {
+        let case = Case::new(Loads::Prototype, 3.0, 40.0);
+        let mut scenario = case.scenario(0);
+        (scenario.rig.rig.travel_mm, scenario.rig.rig.step_positions_mm[2]) = (240.0, 220.0);
+        assert_eq!(experiment::run_as(&case, &scenario).unwrap().crossings.len(), 3);
+    }
+
+    #[test]
     fn the_measured_force_is_the_one_that_the_reference_gives() {
         let case = Case::new(Loads::Prototype, 8.0, 40.0);
         // The tread of the reference does not give way along the wall; this one by 0.4 of what 3 mm do.
