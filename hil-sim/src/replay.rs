@@ -10,7 +10,7 @@ use interstage::tick::{Controller, Entry, Event, Input, Output, State};
 use serde::Serialize;
 use serde_json::Value;
 
-use crate::record::{self, Controller as Columns, Mark, Run};
+use crate::record::{self, Columns, Mark, Run};
 
 /// Outcome of a replay.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]

@@ -1,7 +1,7 @@
 //! The firmware itself on the emulated board, the plant at its pins.
 
 use hil_sim::plant::rig::Drives;
-use hil_sim::record::{Controller, CrossingLine, Recording, Run, starter};
+use hil_sim::record::{Columns, CrossingLine, Recording, Run, starter};
 use hil_sim::scenario::Scenario;
 use hil_sim::scenario::injection::{Injection, Kind, Target};
 use hil_sim::session::{Options, RunningRig, Session};
@@ -34,7 +34,7 @@ fn drives(board: &mut Board, milliseconds: u32) -> bool {
 }
 
 /// Rows of the binary log, a tick each.
-fn rows(recording: &Recording) -> Vec<Controller> {
+fn rows(recording: &Recording) -> Vec<Columns> {
     Run::of_stream(&recording.stream).rows
 }
 
@@ -62,7 +62,7 @@ fn software(scenario: &Scenario, first: u32, command: u32) -> Recording {
 }
 
 /// Codes of the four sensors.
-fn codes(row: &Controller) -> [Option<u16>; 4] {
+fn codes(row: &Columns) -> [Option<u16>; 4] {
     [row.wheel_encoder_code, row.preload_code, row.compression_code, row.arm_angle_code]
 }
 

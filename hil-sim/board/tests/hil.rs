@@ -9,7 +9,7 @@ use hil_sim::plant::rig::VirtualRig;
 use hil_sim::plant::sensors::Sensors;
 use hil_sim::probe::Port;
 use hil_sim::record::Recording;
-use hil_sim::record::{Controller, Run};
+use hil_sim::record::{Columns, Run};
 use hil_sim::replay::replay;
 use hil_sim::scenario::Scenario;
 use hil_sim::session;
@@ -183,7 +183,7 @@ fn a_host_that_falls_silent_leaves_the_bridges_off() {
     let run = Run::of_stream(&stream);
     let alone = run.rows.iter().position(|row| row.tick >= FIRST + 3000).expect("it continues");
     let rows = &run.rows[alone..];
-    let seen: Vec<_> = rows.iter().filter_map(Controller::telemetry).collect();
+    let seen: Vec<_> = rows.iter().filter_map(Columns::telemetry).collect();
     // It went on alone: after 200 ms a tick a millisecond, of which the last few are not
     // in the log yet.
     assert!((785..=800).contains(&seen.len()), "{} ticks", seen.len());

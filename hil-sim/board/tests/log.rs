@@ -1,6 +1,6 @@
 //! The binary log of the firmware itself, on the emulated board.
 
-use hil_sim::record::{Controller, Mark, Run};
+use hil_sim::record::{Columns, Mark, Run};
 use hil_sim::replay::replay;
 use interstage::rig::Rig;
 use interstage::supervise::Mode;
@@ -210,7 +210,7 @@ fn a_restart_in_the_middle_is_marked_and_both_parts_run_again() {
     assert_eq!([0, 1, 2].map(|boot| placed(boot).is_some()), [false, true, false]);
     let result = replay(&run, &Rig::prototype()).expect("a sound rig");
     assert!(result.difference.is_none(), "{result:?}");
-    let idle = run.rows.last().and_then(Controller::telemetry).expect("a row");
+    let idle = run.rows.last().and_then(Columns::telemetry).expect("a row");
     assert_eq!(idle.mode, Mode::Idle);
     assert!(result.ticks as usize > run.rows.len() / 2, "{result:?}");
 }

@@ -5,7 +5,7 @@ use std::time::Duration;
 use clap::Parser;
 use hil_sim::cli::{capture, live};
 use hil_sim::probe::{Port, PortError, ReconnectingPort};
-use hil_sim::record::{Controller, Decoder, Item, Probed, Run, Source, SourceError};
+use hil_sim::record::{Columns, Decoder, Item, Probed, Run, Source, SourceError};
 use hil_sim::replay::replay;
 use hil_sim::scenario::injection::{Injection, Kind, Target};
 use interstage::fault::Limit;
@@ -123,7 +123,7 @@ fn capture_and_live_over_a_slow_probe_keep_both_starts_of_a_board_that_is_reset(
         let halted = Event::Limit(Limit::CoreHalted);
         let halts = run.events.iter().filter(|entry| entry.event == halted).count();
         assert_eq!((halts, run.counts.restarts), (1, 1), "{verb}: {:?}", run.marks);
-        let last = |boot| run.since_boot(boot).rows.last().and_then(Controller::telemetry);
+        let last = |boot| run.since_boot(boot).rows.last().and_then(Columns::telemetry);
         let modes = [0, 1].map(|boot| last(boot).expect("rows").mode);
         assert!(matches!(modes, [Mode::Run(..), Mode::Complete(_)]), "{verb}: {modes:?}");
         // The ring holds less than what comes in the probe's longest pauses: that is marked.

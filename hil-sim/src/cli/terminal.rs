@@ -72,7 +72,7 @@ fn details(s: &Summary, more: Option<String>) -> String {
 fn ledger(crossings: &[CrossingLine], all: bool) -> Table {
     let columns = || COLUMNS.iter().filter(|column| all || column.on_terminal);
     let (between, by) = if all { (", ", "slowed by") } else { ("\n", "slowed\nby") };
-    let names = columns().map(|c| format!("{}{between}{}", c.name, c.unit));
+    let names = columns().map(|c| format!("{}{between}{}", c.title.replace(", ", between), c.unit));
     let names = names.map(|name| name.trim_end_matches(between).to_owned());
     let head = std::iter::once("step".to_owned()).chain(names).chain([by.to_owned()]);
     let rows = crossings.iter().map(|line| {
@@ -129,7 +129,7 @@ mod tests {
         let words = ["preload limit", "preload slew"];
         assert!(words.iter().any(|words| line.contains(words)), "{line}");
         assert!(!text.contains(" predicted"));
-        assert!(run(&summary, &[], true).contains("\n predicted, mm "), "a row each");
+        assert!(run(&summary, &[], true).contains("\n gap, predicted, mm "), "a row each");
         assert!(text.ends_with("  wrote out/run/report.html\n"));
         let files = ["report.html", "log.csv"].map(|name| PathBuf::from("out/run").join(name));
         assert!(run(&summary, &files, false).ends_with("/: report.html, log.csv\n"));

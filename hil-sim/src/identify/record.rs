@@ -12,7 +12,7 @@ use interstage::supervise::Mode;
 
 use super::IdentifyError;
 use crate::plant::rig::Drives;
-use crate::record::{Controller, Run};
+use crate::record::{Columns, Run};
 use crate::scenario::{Direction, Scenario};
 
 /// Longest gap in a log that is bridged by the last reading, ticks.
@@ -72,7 +72,7 @@ impl Record {
                 if row.retracts { Direction::Retract } else { Direction::Deploy };
         }
         let mut reader = Reader::new(&scenario);
-        let sample = |row: &Controller| {
+        let sample = |row: &Columns| {
             let driven = Drives {
                 drive: row.drive_duty,
                 drive_on: row.drive_on,

@@ -9,7 +9,7 @@ use ratatui::symbols::Marker;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Axis, Block, Chart, Dataset, GraphType};
 
-use crate::record::Controller;
+use crate::record::Columns;
 use crate::report::axis::extent;
 use crate::table::label;
 
@@ -20,7 +20,7 @@ const INTERVALS: f64 = 4.0;
 
 /// What a plot has of a tick.
 pub(super) struct Row {
-    pub(super) seen: Controller,
+    pub(super) seen: Columns,
     /// Clearance of the next step's root, mm; `NaN` away from a step.
     pub(super) clearance_mm: f64,
     /// The largest gap that is wanted, mm.

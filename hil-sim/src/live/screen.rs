@@ -17,7 +17,7 @@ use ratatui::text::Line;
 use ratatui::widgets::{Block, Paragraph};
 
 use super::plot::{PLOTS, Row, SPAN_S};
-use crate::record::{Controller, Counts, Item, LedgerLine, Mark, View, shown, text};
+use crate::record::{Columns, Counts, Item, LedgerLine, Mark, View, shown, text};
 use crate::report::Geometry;
 
 /// Ticks between two points of a plot.
@@ -127,7 +127,7 @@ impl Screen {
         }
     }
 
-    fn add_row(&mut self, seen: Controller) {
+    fn add_row(&mut self, seen: Columns) {
         let clearance_mm = self.known.geometry.clearance_mm(seen.position_mm, seen.radius_mm);
         let gap_ref_mm = self.known.gap_ref_mm[usize::from(seen.retracts)];
         self.rows.push_back(Row { seen, clearance_mm, gap_ref_mm, gap_mm: f64::NAN });
@@ -194,7 +194,7 @@ impl Screen {
     /// Style of the state: red in a fault, green while the drive moves.
     fn style(&self) -> Style {
         let strong = Style::new().add_modifier(Modifier::BOLD);
-        match self.view.row().and_then(Controller::mode) {
+        match self.view.row().and_then(Columns::mode) {
             Some(Mode::FaultHold(_)) => strong.fg(Color::Red),
             Some(mode) if mode.moves() => strong.fg(Color::Green),
             _ => strong,

@@ -4,7 +4,7 @@
 use interstage::sense::raw::AngleFrame;
 use interstage::units::Q16;
 
-use super::Controller;
+use super::Columns;
 
 /// Bits of an angle frame: the code, the sensor's error flag, the parity.
 pub(super) const ANGLE: u16 = 0x3FFF;
@@ -33,7 +33,7 @@ pub(crate) struct Column {
     /// The plot that shows it and the name of its curve.
     pub curve: Option<(&'static str, &'static str)>,
     /// Its value, `NaN` if unknown.
-    pub of: fn(&Controller) -> f64,
+    pub of: fn(&Columns) -> f64,
 }
 
 /// A quantity in a column.
@@ -127,7 +127,7 @@ mod tests {
         for bits in 0..=u16::MAX {
             let mut sensors = SensorFrame::default();
             sensors[SensorId::ArmAngle] = Some(Sample { code: bits, at: 9 });
-            let tick = Controller::of(&Record::default(), &sensors);
+            let tick = Columns::of(&Record::default(), &sensors);
             assert_eq!(tick.sensors(), sensors, "{bits:#06x}");
             assert_eq!(tick.arm_angle_code, Some(bits & 0x3FFF));
             let is_good = interstage::sense::angle::decode(AngleFrame::new(bits)).is_ok();

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use super::{Header, MODE_NAMES, STAGE_NAMES, Tick};
+use super::{Header, MODE_NAMES, Row, STAGE_NAMES};
 use crate::files::{FileError, write_text};
 
 /// What a table has no place for.
@@ -27,7 +27,7 @@ pub(crate) struct Metadata {
 
 /// Adds a row. Reading gives the same bits; what is unknown is `NaN`. Without truth its
 /// columns are absent.
-pub(super) fn write_row<W: Write>(csv: &mut csv::Writer<W>, tick: &Tick) -> csv::Result<()> {
+pub(super) fn write_row<W: Write>(csv: &mut csv::Writer<W>, tick: &Row) -> csv::Result<()> {
     match tick.truth {
         Some(truth) => csv.serialize((tick.controller, truth)),
         None => csv.serialize(tick.controller),
@@ -70,7 +70,7 @@ pub(crate) fn write_metadata(
 
 /// The columns in their order, as a CSV writer derives it.
 fn columns(with_truth: bool) -> Vec<Value> {
-    let example = Tick::example(with_truth);
+    let example = Row::example(with_truth);
     let mut table = csv::Writer::from_writer(Vec::new());
     // Numbers and texts always have a form.
     let written = write_row(&mut table, &example).ok().and_then(|()| table.into_inner().ok());
@@ -98,8 +98,8 @@ mod tests {
     use documented::DocumentedFields as _;
 
     use super::*;
-    use crate::record::Controller;
     use crate::record::write::write_csv;
+    use crate::record::{Columns, TrueState};
     use crate::report::example;
 
     #[test]
@@ -110,8 +110,7 @@ mod tests {
         let mut table = csv::Reader::from_path(&path).unwrap();
         let head: Vec<String> = table.headers().unwrap().iter().map(str::to_owned).collect();
         let columns = columns(true);
-        let names: Vec<&str> =
-            columns.iter().filter_map(|column| column["name"].as_str()).collect();
+        let names: Vec<&str> = columns.iter().filter_map(|one| one["name"].as_str()).collect();
         assert_eq!(names, head);
         for row in table.records().map(Result::unwrap) {
             for (cell, column) in row.iter().zip(&columns) {
@@ -126,15 +125,18 @@ mod tests {
     }
 
     #[test]
-    fn the_page_lists_the_columns() {
+    fn the_page_lists_the_columns_of_controller_and_truth() {
         let row = |column: &Value| {
             let name = column["name"].as_str().unwrap();
-            let text = Controller::get_field_docs(name).unwrap().replace('\n', " ");
-            format!("| `{name}` | {text} |\n")
+            let text = Columns::get_field_docs(name).or_else(|_| TrueState::get_field_docs(name));
+            format!("| `{name}` | {} |\n", text.unwrap().replace('\n', " "))
         };
-        let table: String = columns(false).iter().map(row).collect();
-        let page = include_str!("../../../docs/LOGGING.md");
-        assert!(page.contains(&table), "docs/LOGGING.md lacks\n{table}");
+        let all: Vec<String> = columns(true).iter().map(row).collect();
+        let (controller, truth) = all.split_at(columns(false).len());
+        for table in [controller.concat(), truth.concat()] {
+            let page = include_str!("../../../docs/LOGGING.md");
+            assert!(page.contains(&table), "docs/LOGGING.md lacks\n{table}");
+        }
     }
 
     #[test]

@@ -127,6 +127,8 @@ pub struct Decoder {
     last: Option<(u32, SensorFrame)>,
     /// Frames are missing since the last tick.
     torn: bool,
+    /// The frames are of another layout, as the last identity says: none is decoded.
+    is_other: bool,
     counts: Counts,
 }
 
@@ -209,10 +211,12 @@ impl Decoder {
         self.counts.frames += 1;
         self.follow(frame, &body, take);
         match body {
-            Body::Identity(identity) if identity.schema != SCHEMA => {
-                take(Item::Mark(Mark::Schema { found: identity.schema }));
+            Body::Identity(identity) => {
+                self.is_other = identity.schema != SCHEMA;
+                let mark = Item::Mark(Mark::Schema { found: identity.schema });
+                take(if self.is_other { mark } else { Item::Identity(identity) });
             }
-            Body::Identity(identity) => take(Item::Identity(identity)),
+            _ if self.is_other => {}
             Body::Ticks(ticks) => {
                 for record in ticks {
                     match record {

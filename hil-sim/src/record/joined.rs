@@ -7,7 +7,7 @@ use interstage::model::Planner;
 use interstage::tick::{Entry, Telemetry};
 use interstage::units::{Direction, Tick};
 
-use super::{Controller, Decoder, Item, Recording, RunRecorder};
+use super::{Columns, Decoder, Item, Recording, RunRecorder};
 use crate::plant::rig::{Truth, VirtualRig};
 use crate::scenario::Scenario;
 
@@ -19,7 +19,7 @@ pub struct JoinedLog {
     first: Tick,
     decoder: Decoder,
     /// Ticks and events by the millisecond from the first.
-    ticks: VecDeque<(Tick, Telemetry, Controller)>,
+    ticks: VecDeque<(Tick, Telemetry, Columns)>,
     events: VecDeque<(Tick, Entry)>,
     /// The plant before each millisecond.
     truths: Vec<Truth>,
@@ -60,7 +60,7 @@ impl JoinedLog {
                     *start = *latest;
                 }
                 *last = at;
-                let mut columns = Controller::of(&record, &codes);
+                let mut columns = Columns::of(&record, &codes);
                 columns.t_s += f64::from(*start) * 1e-3;
                 ticks.push_back((*start + at, record.telemetry, columns));
             }
@@ -101,7 +101,7 @@ impl JoinedLog {
         let mut recorder = RunRecorder::new(gap_ref, start_mm);
         let mut seen = Telemetry::default();
         for (now, truth) in (0..).zip(&self.truths) {
-            let mut columns = Controller::unknown(now);
+            let mut columns = Columns::unknown(now);
             while let Some((_, telemetry, tick)) = self.ticks.pop_front_if(|tick| tick.0 <= now) {
                 (seen, columns) = (telemetry, tick);
             }

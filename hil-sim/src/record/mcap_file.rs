@@ -13,8 +13,8 @@ use serde::Serialize;
 use serde_json::{Map, Value, json};
 
 use super::{
-    Controller, CrossingLine, Decoder, Item, LedgerLine, MODE_NAMES, Recording, STAGE_NAMES,
-    Summary, Tick, text,
+    Columns, CrossingLine, Decoder, Item, LedgerLine, MODE_NAMES, Recording, Row, STAGE_NAMES,
+    Summary, text,
 };
 use crate::files::{Failure, FileError, atomic_write};
 
@@ -95,7 +95,7 @@ impl Topic {
     pub(crate) fn schema(self) -> Value {
         match self {
             Self::Tick => {
-                let (tick, required) = (Tick::example(true), ["tick", "t_s", "mode"]);
+                let (tick, required) = (Row::example(true), ["tick", "t_s", "mode"]);
                 let mut schema = flat_schema("interstage.Tick", &tick, &required);
                 enumerate(&mut schema, "mode", &MODE_NAMES);
                 enumerate(&mut schema, "stage", &STAGE_NAMES);
@@ -119,7 +119,7 @@ impl Topic {
 pub fn messages(item: &Item) -> Option<(Topic, Vec<u8>)> {
     match item {
         Item::Tick(record, sensors) => {
-            let tick = Tick { controller: Controller::of(record, sensors), truth: None };
+            let tick = Row { controller: Columns::of(record, sensors), truth: None };
             body(Topic::Tick, &tick)
         }
         Item::Ledger(line) => body(Topic::Ledger, &LedgerLine::from(line)),

@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use super::csv_file::{self, Metadata as TableMetadata};
 use super::mcap_file::unwrapped;
-use super::tick::OFF;
-use super::{Controller, Decoder, FRAMES, Mark, Run};
+use super::row::OFF;
+use super::{Columns, Decoder, FRAMES, Mark, Run};
 use mcap::records::{Metadata, Record};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
@@ -66,8 +66,9 @@ impl Run {
             }
             run
         };
-        if run.rows.is_empty() {
-            let other = run.marks.iter().find(|(_, mark)| matches!(mark, Mark::Schema { .. }));
+        let other = run.marks.iter().find(|(_, mark)| matches!(mark, Mark::Schema { .. }));
+        // What came before the first identity may be of any layout.
+        if run.rows.is_empty() || run.header.is_none() && other.is_some() {
             let why = other.map_or("it holds no tick".to_owned(), |(_, mark)| mark.to_string());
             return Err(no_log(why));
         }
@@ -181,9 +182,9 @@ fn of_csv(bytes: &[u8], metadata: TableMetadata) -> Result<Run, String> {
     let bytes = &bytes[..whole];
     let mut reader = csv::Reader::from_reader(bytes);
     let head = reader.headers().map_err(|error| error.to_string())?.clone();
-    let columns = serde_json::to_value(Controller::default()).unwrap_or_default();
+    let columns = serde_json::to_value(Columns::default()).unwrap_or_default();
     // A quantity that the table lacks is unknown; what the controller was given must be there.
-    let is_quantity = |name: &str| Controller::QUANTITIES.iter().any(|column| column.name == name);
+    let is_quantity = |name: &str| Columns::QUANTITIES.iter().any(|column| column.name == name);
     let lacks = |name: &&String| !is_quantity(name) && !head.iter().any(|found| found == *name);
     if let Some((name, _)) = columns.as_object().into_iter().flatten().find(|(name, _)| lacks(name))
     {
@@ -191,7 +192,7 @@ fn of_csv(bytes: &[u8], metadata: TableMetadata) -> Result<Run, String> {
     }
     let mut last = None;
     for row in reader.records() {
-        let row = row.and_then(|row| row.deserialize::<Controller>(Some(&head)));
+        let row = row.and_then(|row| row.deserialize::<Columns>(Some(&head)));
         let row = row.map_err(|error| error.to_string())?;
         let behind = last.map_or(0, |last: u32| row.tick.saturating_sub(last.saturating_add(1)));
         run.counts.lost_ticks += u64::from(behind);

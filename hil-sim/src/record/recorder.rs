@@ -8,10 +8,10 @@ use interstage::units::{Direction, Duty, Q16};
 use serde_json::{Map, Value, json};
 use sha2::{Digest, Sha256};
 
-use super::tick::MOVES;
+use super::row::MOVES;
 use super::time_lost::TimeSplit;
 use super::{
-    Controller, CrossingLine, LogLine, Recording, Report, Summary, Tick, mode_number, mode_words,
+    Columns, CrossingLine, LogLine, Recording, Report, Row, Summary, mode_number, mode_words,
     stage_name,
 };
 use crate::plant::draw::PlantParameters;
@@ -29,19 +29,22 @@ const ARRIVED_WITHIN_MM: f64 = 1.0;
 /// its `rig.step_tolerance_mm`, which is less than half of what parts two steps.
 const SAME_STEP_MM: f64 = 5.0;
 
-/// The record of a run that goes on.
+/// The record of a run that goes on: the one builder of a [`Summary`], with the plant's truth or
+/// from what the controller measured alone.
 #[derive(Default)]
 pub(crate) struct RunRecorder {
     /// Digest of the controller's outputs.
     digest: Sha256,
     /// One row a tick, if they are kept.
-    rows: Vec<Tick>,
-    log: Vec<LogLine>,
+    pub(super) rows: Vec<Row>,
+    pub(super) log: Vec<LogLine>,
     /// Crossings as the controller reported them, and when, s.
     reported: Vec<(f64, CrossingRecord)>,
     /// Reference gap, faults, limits, and what restarted the controller after the command.
     summary: Summary,
     start_mm: f64,
+    /// The mode seen last.
+    pub(super) mode: Mode,
     commanded: Option<f64>,
     run_started: Option<f64>,
     run_ended: f64,
@@ -59,69 +62,92 @@ impl RunRecorder {
         Self { summary, start_mm, ..Self::default() }
     }
 
-    /// Time at which this tick began, s.
-    fn time_s(&self) -> f64 {
-        f64::from(self.passed) * TICK_S
-    }
-
-    /// Takes a tick: the controller's state and events, the plant's `truth` before it, and the
-    /// controller's columns if rows are kept.
+    /// Takes the tick after the last: the controller's state and events, the plant's `truth` before
+    /// it, and the controller's columns if rows are kept.
     pub(crate) fn take(
         &mut self,
         telemetry: &Telemetry,
         events: &[Entry],
         truth: &Truth,
-        columns: Option<Controller>,
+        columns: Option<Columns>,
     ) {
-        let t_s = self.time_s();
+        let at = self.passed;
         digest(&mut self.digest, telemetry);
-        let sigma = telemetry.position_sigma;
-        self.summary.position_sigma_mm = (sigma < Q16::MAX).then(|| sigma.to_num());
-        for Entry { event, .. } in events {
-            self.log.push(LogLine { t_s, text: text(event) });
-            self.summary.take(t_s, event);
-            match event {
-                Event::Crossing(record) => self.reported.push((t_s, *record)),
-                // Under way, it ends the run.
-                Event::Restart(restart) if self.commanded.is_some() => {
-                    self.summary.restart = Some(restart_words(*restart));
-                }
-                Event::Mode(Mode::Preload(_)) => self.accept_command(),
-                _ => {}
-            }
-        }
+        events.iter().for_each(|entry| self.event(at, &entry.event));
         if let Some(controller) = columns {
-            self.rows.push(Tick { controller, truth: Some(truth.into()) });
+            self.rows.push(Row { controller, truth: Some(truth.into()) });
         }
-        self.close_tick(mode_number(telemetry.mode), truth);
+        self.close_tick(at, telemetry, Some(truth));
     }
 
-    /// A command was accepted in this tick: from it on the duration counts, unless the drive
-    /// already moved.
-    fn accept_command(&mut self) {
-        if self.run_started.is_none() {
-            self.commanded = Some(self.time_s());
+    /// Takes an event of the tick of this number.
+    pub(super) fn event(&mut self, at: u32, event: &Event) {
+        let t_s = f64::from(at) * TICK_S;
+        self.log.push(LogLine { t_s, text: text(event) });
+        self.summary.take(t_s, event);
+        match event {
+            Event::Crossing(record) => self.reported.push((t_s, *record)),
+            // Under way, it ends the run.
+            Event::Restart(restart) if self.commanded.is_some() => {
+                self.summary.restart = Some(restart_words(*restart));
+            }
+            Event::Mode(mode) => {
+                // From the accepted command on the duration counts, unless the drive already moved.
+                if matches!(mode, Mode::Preload(_)) && self.run_started.is_none() {
+                    self.commanded = Some(t_s);
+                }
+                self.mode = *mode;
+            }
+            _ => {}
         }
     }
 
-    /// Ends a tick in the mode of this number.
-    fn close_tick(&mut self, mode: u8, truth: &Truth) {
-        let t_s = self.time_s();
-        self.split.add(t_s, mode, truth.position_mm);
+    /// Ends the tick of this number: position and preload are the true ones, or as measured.
+    pub(super) fn close_tick(&mut self, at: u32, seen: &Telemetry, truth: Option<&Truth>) {
+        let t_s = f64::from(at) * TICK_S;
+        let measured = (seen.position.to_num(), seen.preload.to_num(), 0.0);
+        let (position_mm, preload_n, separation_mm) =
+            truth.map_or(measured, |t| (t.position_mm, t.preload_n, t.separation_mm));
+        let mode = mode_number(seen.mode);
+        self.split.add(t_s, mode, position_mm);
         if MOVES.contains(&mode) {
             self.run_started.get_or_insert(t_s);
             self.run_ended = t_s;
-            self.preload_sum += truth.preload_n;
+            self.preload_sum += preload_n;
             self.moving += 1;
-            self.worst_separation = self.worst_separation.max(truth.separation_mm);
+            self.worst_separation = self.worst_separation.max(separation_mm);
         }
-        self.passed += 1;
+        let sigma = seen.position_sigma;
+        self.summary.position_sigma_mm = (sigma < Q16::MAX).then(|| sigma.to_num());
+        self.mode = seen.mode;
+        self.passed = at + 1;
+    }
+
+    /// What ticks and events make of the summary of a run that got there or did not.
+    pub(super) fn summary(&mut self, scenario: Option<&Scenario>, arrived: bool) -> Summary {
+        let completed = arrived && self.summary.faults.is_empty();
+        let commanded_s = self.run_started.and(self.commanded);
+        let known = scenario.filter(|_| completed && commanded_s.is_some());
+        Summary {
+            completed,
+            controller: scenario.map_or("unknown", |known| known.run.controller.name()).into(),
+            seed: scenario.map_or(0, |scenario| scenario.run.seed),
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            overrides: scenario.map(Scenario::overrides).unwrap_or_default(),
+            commanded_s,
+            duration_s: commanded_s.map(|from| self.run_ended - from),
+            moving_s: self.run_started.map_or(0.0, |from| self.run_ended - from),
+            lost: known.map(|known| self.split.lost(known.rig.drive.cruise_speed_mm_s)),
+            total_s: f64::from(self.passed) * TICK_S,
+            mean_preload_n: self.preload_sum / f64::from(self.moving.max(1)),
+            ..std::mem::take(&mut self.summary)
+        }
     }
 
     /// The record of a run on `target` that took `wall_s` to compute. `arrived` is the
     /// direction of a completed run, as the controller reports it.
     pub(crate) fn finish(
-        self,
+        mut self,
         target: &'static str,
         scenario: &Scenario,
         plant: &VirtualRig,
@@ -138,46 +164,29 @@ impl RunRecorder {
         let crossings: Vec<CrossingLine> =
             plant.ledger().crossings().iter().map(|c| crossing_line(c, &self.reported)).collect();
         let worst = crossings.iter().map(|c| c.gap_mm).fold(self.worst_separation, f64::max);
-        let completed = there && crossings.len() == steps && self.summary.faults.is_empty();
-        let cruise_mm_s = scenario.rig.drive.cruise_speed_mm_s;
         let has_gap = !crossings.is_empty() || worst > 0.0;
-        let total_s = self.time_s();
-        let commanded_s = self.run_started.and(self.commanded);
+        let common = self.summary(Some(scenario), there && crossings.len() == steps);
+        let total_s = common.total_s;
+        let faults = scenario.run.faults.iter();
         let summary = Summary {
-            completed,
             target: target.into(),
-            controller: scenario.run.controller.name().into(),
             direction: scenario.run.direction.name().into(),
             rig: scenario.preset.clone(),
-            seed: scenario.run.seed,
-            version: env!("CARGO_PKG_VERSION").to_owned(),
-            overrides: scenario.overrides(),
             drawn: drawn(plant.parameters(), scenario),
-            commanded_s,
-            duration_s: commanded_s.map(|from| self.run_ended - from),
-            moving_s: self.run_started.map_or(0.0, |from| self.run_ended - from),
-            lost: completed.then(|| self.split.lost(cruise_mm_s)),
-            total_s,
             cut_off_s: Some(longest_s(&scenario.rig)).filter(|longest_s| total_s >= *longest_s),
             travel_mm: (truth.position_mm - self.start_mm).abs(),
             max_gap_mm: if has_gap { worst } else { f64::NAN },
             slip_mm: truth.slip_mm,
-            mean_preload_n: self.preload_sum / f64::from(self.moving.max(1)),
             energy_j: truth.work_mj * 1e-3,
             friction_work_j: truth.friction_work_mj * 1e-3,
-            injected: scenario.run.faults.iter().map(|fault| fault.words(commanded_s)).collect(),
+            injected: faults.map(|fault| fault.words(common.commanded_s)).collect(),
             real_time_factor: total_s / wall_s.max(1e-9),
             trace_digest: self.digest.finalize().iter().map(|b| format!("{b:02x}")).collect(),
             crossings,
-            ..self.summary
+            ..common
         };
-        Recording {
-            summary,
-            rows: self.rows,
-            log: self.log,
-            parameters: scenario.to_toml(),
-            stream: Vec::new(),
-        }
+        let parameters = scenario.to_toml();
+        Recording { summary, rows: self.rows, log: self.log, parameters, ..Recording::default() }
     }
 }
 
@@ -190,27 +199,37 @@ fn crossing_line(crossing: &Crossing, reported: &[(f64, CrossingRecord)]) -> Cro
             && (r.position.to_num::<f64>() - crossing.step_mm).abs() < SAME_STEP_MM
     };
     let reported = reported.iter().find(same);
-    let num = |f: fn(&CrossingRecord) -> Q16| reported.map(|(_, r)| f(r).to_num::<f64>());
     CrossingLine {
         index: crossing.index as u8,
         speed_mm_s: crossing.speed_mm_s,
         preload_n: crossing.preload_n,
         gap_mm: crossing.gap_mm,
-        gap_predicted_mm: num(|r| r.gap_predicted),
-        gap_measured_mm: num(|r| r.gap_measured),
         corner_force_n: crossing.corner_n,
-        lead_time_s: num(|r| r.lead_time),
         slip_mm: crossing.slip_mm,
-        slip_measured_mm: num(|r| r.slip),
-        slip_sigma_mm: num(|r| r.slip_sigma),
-        height_measured_mm: num(|r| r.height),
         touch_s: crossing.touch_s,
         lift_s: crossing.lift_s,
         step_mm: crossing.step_mm,
-        step_found_mm: num(|r| r.position),
         peak_preload_n: crossing.peak_preload_n,
         peak_utilisation: crossing.peak_utilisation,
-        limited_by: reported.and_then(|(_, r)| r.limited_by),
+        ..reported.map_or_else(CrossingLine::default, |(_, record)| record.into())
+    }
+}
+
+impl From<&CrossingRecord> for CrossingLine {
+    /// What the controller reported, without what only a plant or its own rows know.
+    fn from(record: &CrossingRecord) -> Self {
+        let num = |value: Q16| Some(value.to_num());
+        Self {
+            gap_predicted_mm: num(record.gap_predicted),
+            gap_measured_mm: num(record.gap_measured),
+            lead_time_s: num(record.lead_time),
+            slip_measured_mm: num(record.slip),
+            slip_sigma_mm: num(record.slip_sigma),
+            height_measured_mm: num(record.height),
+            step_found_mm: num(record.position),
+            limited_by: record.limited_by,
+            ..Self::default()
+        }
     }
 }
 
@@ -227,7 +246,7 @@ fn digest(digest: &mut Sha256, seen: &Telemetry) {
 
 impl Summary {
     /// Takes the report of a fault or a limit, if the event is one.
-    pub(super) fn take(&mut self, t_s: f64, event: &Event) {
+    fn take(&mut self, t_s: f64, event: &Event) {
         let (all, code, text) = match event {
             Event::Fault(fault) => (&mut self.faults, fault.code(), fault.sentence()),
             Event::Limit(limit) => (&mut self.limits, limit.code(), limit.sentence()),
@@ -321,6 +340,10 @@ fn drawn(plant: &PlantParameters, scenario: &Scenario) -> Map<String, Value> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use interstage::supervise::Leg;
+
+    const REST: Mode = Mode::Idle;
+    const RUN: Mode = Mode::Run(Direction::Deploy, Leg::Cruise);
 
     fn at_rest() -> (Scenario, VirtualRig) {
         let scenario = Scenario::default();
@@ -346,27 +369,27 @@ mod tests {
     fn only_ticks_under_way_count() {
         let mut recorder = RunRecorder::new(2.5, 0.0);
         let (_, plant) = at_rest();
-        for (mode, preload_n, separation_mm) in
-            [(3, 90.0, 9.0), (5, 30.0, 0.1), (5, 40.0, 0.3), (3, 90.0, 9.0)]
-        {
-            recorder.close_tick(mode, &Truth { preload_n, separation_mm, ..*plant.truth() });
+        let ticks = [(REST, 90.0, 9.0), (RUN, 30.0, 0.1), (RUN, 40.0, 0.3), (REST, 90.0, 9.0)];
+        for (mode, preload_n, separation_mm) in ticks {
+            let truth = Truth { preload_n, separation_mm, ..*plant.truth() };
+            recorder.take(&Telemetry { mode, ..Telemetry::default() }, &[], &truth, None);
         }
         assert_eq!((recorder.run_started, recorder.run_ended), (Some(1e-3), 2e-3));
         assert_eq!((recorder.preload_sum, recorder.moving), (70.0, 2));
-        assert_eq!((recorder.worst_separation, recorder.time_s()), (0.3, 4e-3));
+        assert_eq!((recorder.worst_separation, recorder.passed), (0.3, 4));
     }
 
     #[test]
     fn the_duration_counts_from_the_last_command_before_the_motion() {
-        let durations = |moves: bool, commands: &[usize]| {
+        let durations = |moves: bool, commands: &[u32]| {
             let (scenario, plant) = at_rest();
             let mut recorder = RunRecorder::new(2.5, 0.0);
-            for tick in 0..10 {
-                if commands.contains(&tick) {
-                    recorder.accept_command();
-                }
-                let under_way = moves && (5..9).contains(&tick);
-                recorder.close_tick(if under_way { 5 } else { 3 }, plant.truth());
+            for at in 0..10 {
+                let event = Event::Mode(Mode::Preload(Direction::Deploy));
+                let events = commands.contains(&at).then_some(Entry { at, event });
+                let mode = if moves && (5..9).contains(&at) { RUN } else { REST };
+                let telemetry = Telemetry { mode, ..Telemetry::default() };
+                recorder.take(&telemetry, events.as_slice(), plant.truth(), None);
             }
             let summary = recorder.finish("sil", &scenario, &plant, None, 1.0).summary;
             (summary.duration_s.map(|s| (1e3 * s).round()), (1e3 * summary.moving_s).round())

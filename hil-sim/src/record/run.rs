@@ -9,7 +9,7 @@ use interstage::supervise::ServiceDuties;
 use interstage::tick::{Entry, Event};
 use serde::{Deserialize, Serialize};
 
-use super::{Controller, Counts, Decoder, Item, Mark};
+use super::{Columns, Counts, Decoder, Item, Mark};
 use crate::scenario::{Scenario, ScenarioError};
 use crate::table::counted;
 
@@ -100,7 +100,7 @@ pub struct Run {
     /// Its header; none if the log has no identity.
     pub header: Option<Header>,
     /// A row a tick, in the order of the log.
-    pub rows: Vec<Controller>,
+    pub rows: Vec<Columns>,
     pub events: Vec<Entry>,
     /// Plans with the ticks that received them.
     pub plans: Vec<(u32, Plan)>,
@@ -166,7 +166,7 @@ impl Run {
     pub(crate) fn add(&mut self, item: &Item) {
         match item {
             Item::Identity(identity) => self.header = Some(identity.into()),
-            Item::Tick(record, sensors) => self.rows.push(Controller::of(record, sensors)),
+            Item::Tick(record, sensors) => self.rows.push(Columns::of(record, sensors)),
             Item::Plan(at, plan) => self.plans.push((*at, *plan)),
             Item::Request(at, request) => self.requests.push((*at, *request)),
             Item::Event(entry) => self.events.push(*entry),

@@ -6,7 +6,7 @@ use interstage::units::{Direction, Q16};
 use serde::{Deserialize, Deserializer, Serialize};
 use serde_json::{Map, Value};
 
-use super::{Tick, TimeLost};
+use super::{Row, TimeLost};
 
 /// A row of the page's table of crossings: the plant's truth beside what the controller reports.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -161,7 +161,7 @@ pub struct Summary {
 #[derive(Clone, Debug, Default)]
 pub struct Recording {
     pub summary: Summary,
-    pub rows: Vec<Tick>,
+    pub rows: Vec<Row>,
     pub log: Vec<LogLine>,
     /// Parameters used, as TOML.
     pub parameters: String,

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::tick::{CROSSES, MOVES, PRELOADS};
+use super::row::{CROSSES, MOVES, PRELOADS};
 use crate::table::number;
 
 /// What a run takes longer than its travel at cruise speed, s. With that travel the parts add up

@@ -5,7 +5,7 @@ use std::time::Instant;
 use interstage::log::Record;
 use interstage::sense::raw::SensorFrame;
 
-use super::{Controller, Counts, Item, Mark, mode_words, stage_name, text};
+use super::{Columns, Counts, Item, Mark, mode_words, stage_name, text};
 use crate::table::{counted, number};
 
 /// Ticks without an answer after which nothing is shown of a sensor.
@@ -13,8 +13,8 @@ const SILENT: u32 = 50;
 
 /// The columns of a tick as a view shows them: unknown is what a silent sensor gave last, and a
 /// gap that no plan predicts.
-pub(crate) fn shown(record: &Record, sensors: &SensorFrame) -> Controller {
-    let mut row = Controller::of(record, sensors);
+pub(crate) fn shown(record: &Record, sensors: &SensorFrame) -> Columns {
+    let mut row = Columns::of(record, sensors);
     let now = row.tick;
     for (at, value) in [
         (row.wheel_encoder_at, &mut row.position_mm),
@@ -37,7 +37,7 @@ pub(crate) fn shown(record: &Record, sensors: &SensorFrame) -> Controller {
 /// The latest items of a log, and its rates.
 #[derive(Default)]
 pub(crate) struct View {
-    row: Option<Controller>,
+    row: Option<Columns>,
     rig: Option<String>,
     event: String,
     mark: Option<Mark>,
@@ -71,7 +71,7 @@ impl View {
         true
     }
 
-    pub(crate) const fn row(&self) -> Option<&Controller> {
+    pub(crate) const fn row(&self) -> Option<&Columns> {
         self.row.as_ref()
     }
 
@@ -147,10 +147,8 @@ mod tests {
         assert!(!view.count(decoder.counts()), "too early for a rate");
         let mut now = *view.row().unwrap();
         now.wheel_encoder_at = Some(now.tick - SILENT - 1);
-        let row = shown(
-            &Record { telemetry: now.telemetry().unwrap(), ..Record::default() },
-            &now.sensors(),
-        );
+        let record = Record { telemetry: now.telemetry().unwrap(), ..Record::default() };
+        let row = shown(&record, &now.sensors());
         assert!(row.wheel_speed_mm_s.is_nan() && row.position_mm.is_nan() && row.preload_n > 0.0);
     }
 }

@@ -8,10 +8,9 @@ use std::path::{Path, PathBuf};
 
 use super::csv_file::{Metadata, write_metadata, write_row};
 use super::mcap_file::{McapFile, TICK_NS, wrapped};
-use super::tick::OFF;
+use super::row::OFF;
 use super::{
-    Controller, Counts, Decoder, Header, Item, Mark, Recording, Run, Tick, Topic, messages,
-    write_mcap,
+    Columns, Counts, Decoder, Header, Item, Mark, Recording, Row, Run, Topic, messages, write_mcap,
 };
 use crate::files::{Failure, FileError, atomic_write, make_directory, with_causes};
 use crate::table::counted;
@@ -148,8 +147,8 @@ impl<M: Write + Seek, C: Write> Writer<M, C> {
                 Item::Tick(record, sensors) => {
                     self.now = self.now.max(self.start + u64::from(record.at()) * TICK_NS);
                     if let Some(csv) = &mut self.csv {
-                        let controller = Controller::of(record, sensors);
-                        write_row(csv, &Tick { controller, truth: None })?;
+                        let controller = Columns::of(record, sensors);
+                        write_row(csv, &Row { controller, truth: None })?;
                     }
                 }
                 Item::Mark(Mark::Restart) => self.start = self.now,
@@ -333,14 +332,12 @@ mod tests {
         assert_eq!(serde_json::from_str::<Summary>(&summary).unwrap(), recording.summary);
         let mut reader = csv::Reader::from_path(&files[0]).unwrap();
         let head = reader.headers().unwrap().clone();
-        let rows: Vec<Tick> = reader
-            .records()
-            .map(|record| {
-                let record = record.unwrap();
-                let controller = record.deserialize(Some(&head)).unwrap();
-                Tick { controller, truth: Some(record.deserialize(Some(&head)).unwrap()) }
-            })
-            .collect();
+        let row = |record: csv::Result<csv::StringRecord>| {
+            let record = record.unwrap();
+            let controller = record.deserialize(Some(&head)).unwrap();
+            Row { controller, truth: Some(record.deserialize(Some(&head)).unwrap()) }
+        };
+        let rows: Vec<Row> = reader.records().map(row).collect();
         // A NaN differs from itself; its text does not.
         assert_eq!(format!("{rows:?}"), format!("{:?}", recording.rows));
     }

@@ -54,7 +54,7 @@ pub(crate) fn animated_svg(recording: &Recording) -> Option<String> {
         )
     };
     let g = &scene.geometry;
-    let (r, lower) = (g.wheel_radius_mm, g.wall_mm(c.face_mm) - c.step_mm);
+    let (r, lower) = (g.wheel_radius_mm, g.wall_mm(c.face_mm) - c.height_mm);
     // Relative to the step's root, y downwards.
     let axle = |t: f64| {
         let [_, position, radius, ..] = scene.row(t);
@@ -64,7 +64,7 @@ pub(crate) fn animated_svg(recording: &Recording) -> Option<String> {
     let turned = animate("animateTransform attributeName=\"transform\" type=\"rotate\"", &|t| {
         format!("{:.1}", (axle(t).0 / r).to_degrees())
     });
-    let arrow = |t: f64| 0.5 * scene.row(t)[4];
+    let arrow = |t: f64| 0.5 * scene.row(t)[3];
     let tail = animate("animate attributeName=\"y1\"", &|t| format!("{:.2}", -arrow(t)));
     // The point of the undeformed wheel next to the root.
     let rim = |t: f64| {
@@ -106,7 +106,7 @@ pub(crate) fn animated_svg(recording: &Recording) -> Option<String> {
         }
         if !scene.measured {
             panel.lines.retain(|line| !matches!(line.look, Look::Measured(_)));
-            panel.marks.retain(|marks| marks.name == "true gap");
+            panel.marks.retain(|marks| marks.name == "gap, true");
         }
         let (plot, [left, right, top, bottom]) = panel.alone(high / ZOOM);
         let at = animate(MOVE, &|t| {
@@ -121,7 +121,7 @@ stroke-width=\"1.5\" d=\"M0 {top}V{bottom}\">{at}</path></g>",
         down += high;
     }
     let [gap, preload] = [palette::GAP, palette::PRELOAD];
-    let (h, reach, hub) = (c.step_mm, scene.gap_ref_mm, 0.7 * r);
+    let (h, reach, hub) = (c.height_mm, scene.gap_ref_mm, 0.7 * r);
     Some(format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{0}\" height=\"{1}\" viewBox=\"0 0 {0} {1}\" \
 font-family=\"sans-serif\" fill=\"#1f2937\">\n<title>A crossing of a simulated run, {SLOWER} times slower: {2}</title>\n\

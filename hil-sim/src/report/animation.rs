@@ -65,7 +65,7 @@ fn at_the_steps(scene: &Scene) -> String {
 
 fn legend(scene: &Scene) -> String {
     let forces = if scene.measured {
-        "This is a captured log: position, radius, compression and preload are those that the \
+        "This is a captured log: position, radius and preload are those that the \
 controller measured or estimated, a touch is where it noticed it, the clearance follows from them, and the forces of corner and \
 wall are not measured."
     } else {
@@ -101,7 +101,7 @@ fn stills(scene: &Scene, c: &Event) -> String {
 fn still(g: &Geometry, c: &Event, (x, y): (f64, f64), title: &str, gap: Option<f64>) -> String {
     let (r, face) = (g.wheel_radius_mm, c.face_mm);
     let upper = g.wall_mm(face);
-    let lower = upper - c.step_mm;
+    let lower = upper - c.height_mm;
     // Relative to the root of the step, y downwards as SVG has it.
     let (cx, cy) = (x - face, lower - y);
     let mut marks = String::new();
@@ -128,7 +128,7 @@ fn still(g: &Geometry, c: &Event, (x, y): (f64, f64), title: &str, gap: Option<f
 <circle class=\"outline\" cx=\"{cx:.2}\" cy=\"{cy:.2}\" r=\"{r}\"/>\n{marks}</svg>\n\
 <figcaption>Step {}: {title}</figcaption></figure>\n",
         0.7 * r,
-        -c.step_mm,
+        -c.height_mm,
         c.index,
     )
 }
@@ -185,7 +185,7 @@ current(scene, t).index];\n\
 }});\nconsole.log(JSON.stringify(out));\n",
             scene.json(),
             before[0] + 0.3 * (behind[0] - before[0]),
-            behind[7],
+            behind[6],
         );
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("scene.cjs");

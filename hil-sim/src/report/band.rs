@@ -4,7 +4,7 @@ use super::axis::Scale;
 use super::palette::{self, Colour};
 use super::panel::{HeatCell, Panel};
 use super::panels::View;
-use crate::record::{MODE_NAMES, Tick};
+use crate::record::{MODE_NAMES, Row};
 
 /// What happens in the study's stages, from number 1.
 const STAGES: [&str; 6] = [
@@ -19,7 +19,7 @@ const STAGES: [&str; 6] = [
 /// One band: its name, what a row shows in it, in words, and the colours by number.
 struct Lane {
     name: &'static str,
-    of: fn(&Tick) -> u8,
+    of: fn(&Row) -> u8,
     show: fn(u8) -> String,
     colours: &'static [Colour],
 }
@@ -71,9 +71,9 @@ pub(super) fn panel(view: &View) -> Panel {
 }
 
 /// Spans of the axis over which `of` stays the same.
-fn spans(view: &View, of: fn(&Tick) -> u8) -> Vec<(f64, f64, u8)> {
-    let x = |row: &Tick| view.across.of(row);
-    let runs: Vec<&[Tick]> = view.rows.chunk_by(|a, b| of(a) == of(b)).collect();
+fn spans(view: &View, of: fn(&Row) -> u8) -> Vec<(f64, f64, u8)> {
+    let x = |row: &Row| view.across.of(row);
+    let runs: Vec<&[Row]> = view.rows.chunk_by(|a, b| of(a) == of(b)).collect();
     let next = runs.iter().skip(1).map(|run| x(&run[0])).chain(view.rows.last().map(x));
     let spans = runs.iter().zip(next).map(|(run, end)| (x(&run[0]), end, of(&run[0])));
     spans.map(|(a, b, value)| (a.min(b), a.max(b), value)).collect()
@@ -82,14 +82,14 @@ fn spans(view: &View, of: fn(&Tick) -> u8) -> Vec<(f64, f64, u8)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::record::{Controller, Recording};
+    use crate::record::{Columns, Recording};
     use crate::report::panels::Across;
 
     #[test]
     fn spans_join_and_name_what_follows() {
-        let row = |t_s, mode| {
-            let controller = Controller { t_s, mode, ..Controller::default() };
-            Tick { controller, truth: None }
+        let row = |t_s, mode| Row {
+            controller: Columns { t_s, mode, ..Columns::default() },
+            truth: None,
         };
         let rows = vec![row(0.0, 5), row(1.0, 5), row(2.0, 6), row(3.0, 7), row(3.002, 7)];
         let recording = Recording { rows, ..Recording::default() };

@@ -10,7 +10,7 @@ use super::svg::escape;
 use super::tables::{COLUMNS, Column};
 use super::verdict::{Grade, gap_sentence, headline, origin, verdict};
 use super::{axis, tables};
-use crate::record::{CrossingLine, Recording, Tick};
+use crate::record::{CrossingLine, Recording, Row};
 use crate::scenario::{brief, leaves};
 use crate::table::number;
 
@@ -20,6 +20,8 @@ pub(crate) struct Difference {
     /// Step number.
     pub index: u8,
     pub quantity: &'static str,
+    #[serde(skip)]
+    pub title: &'static str,
     pub unit: &'static str,
     #[serde(skip)]
     pub decimals: usize,
@@ -35,13 +37,13 @@ pub(crate) struct Difference {
 pub(crate) fn differences(a: &Recording, b: &Recording) -> Vec<Difference> {
     let mut all = Vec::new();
     for (index, a, b) in pairs(a, b) {
-        for Column { name: quantity, unit, decimals, of, .. } in COLUMNS {
+        for Column { name: quantity, title, unit, decimals, of, .. } in COLUMNS {
             let value =
                 |line: Option<&CrossingLine>| line.and_then(of).filter(|value| value.is_finite());
             let (a, b) = (value(a), value(b));
             if a.is_some() || b.is_some() {
                 let change = a.zip(b).map(|(a, b)| b - a);
-                all.push(Difference { index, quantity, unit, decimals, a, b, change });
+                all.push(Difference { index, quantity, title, unit, decimals, a, b, change });
             }
         }
     }
@@ -123,12 +125,12 @@ fn parameters(a: &Recording, b: &Recording) -> String {
 /// The differences as a table's head and rows.
 pub(crate) fn table(differences: &[Difference]) -> (Vec<String>, Vec<Vec<String>>) {
     let head = ["step", "quantity", "A", "B", "B - A"].map(str::to_owned).to_vec();
-    let rows =
-        differences.iter().map(|Difference { index, quantity, unit, decimals, a, b, change }| {
-            let [a, b, change] = [a, b, change].map(|value| number(*value, *decimals));
-            let unit = if unit.is_empty() { String::new() } else { format!(", {unit}") };
-            vec![index.to_string(), format!("{quantity}{unit}"), a, b, change]
-        });
+    let rows = differences.iter().map(|one| {
+        let Difference { index, title, unit, decimals, a, b, change, .. } = one;
+        let [a, b, change] = [a, b, change].map(|value| number(*value, *decimals));
+        let unit = if unit.is_empty() { String::new() } else { format!(", {unit}") };
+        vec![index.to_string(), format!("{title}{unit}"), a, b, change]
+    });
     (head, rows.collect())
 }
 
@@ -151,7 +153,7 @@ fn panels(runs: &[(&str, &Recording)]) -> Vec<Panel> {
     let views: Vec<_> = runs.iter().map(|(_, run)| View::new(run, Across::Time)).collect();
     let ends = views.iter().map(|view| view.x);
     let x = ends.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1))).unwrap_or_default();
-    let line = |of: &dyn Fn(&Tick) -> f64| -> Vec<Line> {
+    let line = |of: &dyn Fn(&Row) -> f64| -> Vec<Line> {
         let all = views.iter().zip(runs).zip(LOOKS);
         all.map(|((view, (name, _)), (colour, width, _))| {
             view.line((*name).to_owned(), Look::Other(colour, width), of)
@@ -159,14 +161,14 @@ fn panels(runs: &[(&str, &Recording)]) -> Vec<Panel> {
         .collect()
     };
     // Where a run ended by a fault.
-    let ends = |of: &dyn Fn(&Tick) -> f64| {
+    let ends = |of: &dyn Fn(&Row) -> f64| {
         let failed = views.iter().filter(|view| !view.recording.summary.faults.is_empty());
-        let end = |row: &Tick| (row.controller.t_s, of(row));
+        let end = |row: &Row| (row.controller.t_s, of(row));
         let points = failed.filter_map(|view| view.rows.last().map(end)).collect();
         let name = "ended by a fault".into();
         vec![Marks { name, shape: Shape::Dot, colour: palette::LIMIT, points }]
     };
-    let panel = |title: &str, y_name, of: &dyn Fn(&Tick) -> f64| Panel {
+    let panel = |title: &str, y_name, of: &dyn Fn(&Row) -> f64| Panel {
         x,
         lines: line(of),
         marks: ends(of),
@@ -179,7 +181,7 @@ fn panels(runs: &[(&str, &Recording)]) -> Vec<Panel> {
     let speed = panel("Speed", "speed, mm/s", &|row| {
         row.known(|t| t.speed_true_mm_s, |c| c.wheel_speed_mm_s)
     });
-    let position = panel("Position on the sleeve", "position, mm", &Tick::position_mm);
+    let position = panel("Position on the sleeve", "position, mm", &Row::position_mm);
     let mut slip = panel("Gross slip of the wheel", "slip, mm", &|row| row.of_truth(|t| t.slip_mm));
     slip.least_span = 2.0;
     let without = views.iter().find(|view| view.recording.summary.gap_ref_mm <= 0.0);

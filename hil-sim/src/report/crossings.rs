@@ -88,7 +88,7 @@ mod tests {
             let panel = &panels(&view)[2];
             let text = panel.figure("", SIZE, "");
             assert_eq!(
-                text.contains("<span data-name=\"measured\">"),
+                text.contains("<span data-name=\"gap, measured\">"),
                 measured,
                 "crossing {}",
                 line.index

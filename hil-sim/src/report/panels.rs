@@ -5,7 +5,7 @@ use super::palette::{self, Colour};
 use super::panel::Look::{Limit, Measured, Truth, Wanted};
 use super::panel::{Line, Look, Marks, Panel, Rule, Shape, sheet};
 use super::verdict::GAP_TOLERANCE;
-use crate::record::{Column, Controller, CrossingLine, Recording, Report, Tick, TrueState};
+use crate::record::{Column, Columns, CrossingLine, Recording, Report, Row, TrueState};
 use crate::scenario::Scenario;
 
 /// What the horizontal axis shows.
@@ -30,7 +30,7 @@ impl Across {
     }
 
     /// The place of `row` on the axis.
-    pub(super) fn of(self, row: &Tick) -> f64 {
+    pub(super) fn of(self, row: &Row) -> f64 {
         match self {
             Self::Time => row.controller.t_s,
             Self::Since(start_s) => row.controller.t_s - start_s,
@@ -39,7 +39,7 @@ impl Across {
     }
 
     /// The place of the time `t_s` on the axis.
-    fn at(self, rows: &[Tick], t_s: f64) -> f64 {
+    fn at(self, rows: &[Row], t_s: f64) -> f64 {
         let place =
             rows.partition_point(|row| row.controller.t_s < t_s).min(rows.len().saturating_sub(1));
         match self {
@@ -50,7 +50,7 @@ impl Across {
     }
 
     /// Range of the rows. Over time it begins at zero, the command, if they go beyond.
-    pub(super) fn range(self, rows: &[Tick]) -> (f64, f64) {
+    pub(super) fn range(self, rows: &[Row]) -> (f64, f64) {
         let (low, high) = axis::extent(rows.iter().map(|row| self.of(row))).unwrap_or((0.0, 1.0));
         match self {
             Self::Time | Self::Since(_) => {
@@ -63,12 +63,12 @@ impl Across {
 }
 
 /// A field of the rows, as a line with its name and look.
-type Field = (&'static str, Look, fn(&Tick) -> f64);
+type Field = (&'static str, Look, fn(&Row) -> f64);
 
 /// The run as the plots need it.
 pub(super) struct View<'a> {
     pub(super) recording: &'a Recording,
-    pub(super) rows: &'a [Tick],
+    pub(super) rows: &'a [Row],
     pub(super) across: Across,
     pub(super) x: (f64, f64),
     pub(super) shades: Vec<(f64, f64, String)>,
@@ -121,7 +121,7 @@ impl<'a> View<'a> {
         &self,
         name: impl Into<String>,
         look: Look,
-        of: impl Fn(&Tick) -> f64,
+        of: impl Fn(&Row) -> f64,
     ) -> Line {
         let points = self.rows.iter().map(|row| (self.across.of(row), of(row))).collect();
         Line { name: name.into(), look, points }
@@ -138,7 +138,7 @@ impl<'a> View<'a> {
             let look = if name == "reference" { Wanted } else { Measured(colour) };
             Some(self.line(name, look, |row| (column.of)(&row.controller)))
         };
-        let mut lines: Vec<Line> = Controller::QUANTITIES.iter().filter_map(of_plot).collect();
+        let mut lines: Vec<Line> = Columns::QUANTITIES.iter().filter_map(of_plot).collect();
         lines.sort_by_key(|line| line.look != Wanted);
         lines.push(self.line("true", Truth, |row| row.of_truth(truth)));
         lines
@@ -198,11 +198,13 @@ impl<'a> View<'a> {
         panel.lines =
             vec![self.line("clearance", Truth, |row| row.of_truth(|t| t.root_clearance_mm) / one)];
         panel.marks = vec![
-            self.marks("measured", (Shape::Ring, palette::GAP), |c| Some(c.gap_measured_mm? / one)),
-            self.marks("predicted", (Shape::Square, palette::FLOOR), |c| {
+            self.marks("gap, measured", (Shape::Ring, palette::GAP), |c| {
+                Some(c.gap_measured_mm? / one)
+            }),
+            self.marks("gap, predicted", (Shape::Square, palette::FLOOR), |c| {
                 Some(c.gap_predicted_mm? / one)
             }),
-            self.marks("true gap", (Shape::Dot, palette::TRUTH), |c| Some(c.gap_mm / one)),
+            self.marks("gap, true", (Shape::Dot, palette::TRUTH), |c| Some(c.gap_mm / one)),
         ];
         let most = 100.0 * (1.0 + GAP_TOLERANCE);
         if reference_mm.is_some() {
@@ -249,9 +251,9 @@ impl<'a> View<'a> {
 }
 
 /// Where the corner first touched and where the axle passed the face.
-fn rules(rows: &[Tick], across: Across, line: &CrossingLine) -> Vec<Rule> {
+fn rules(rows: &[Row], across: Across, line: &CrossingLine) -> Vec<Rule> {
     let from = rows.partition_point(|row| row.controller.t_s < line.touch_s.min(line.lift_s));
-    let ahead = |row: &Tick| row.position_mm() < line.step_mm;
+    let ahead = |row: &Row| row.position_mm() < line.step_mm;
     let side = rows.get(from).map(ahead);
     let passed = rows[from..].iter().find(|row| Some(ahead(row)) != side);
     let face_x = match across {

@@ -187,7 +187,7 @@ function start(scene) {
   // The corner of one step: what the rubber fills, what presses, and the gap beside its reference.
   function inset(row, p, gap) {
     const next = current(scene, now) || scene.crossings[scene.crossings.length - 1];
-    const at = next ? next.face_mm : p.edge ? p.edge[0] : p.x, upper = wallAt(g, at), lower = upper - (next ? next.step_mm : 0);
+    const at = next ? next.face_mm : p.edge ? p.edge[0] : p.x, upper = wallAt(g, at), lower = upper - (next ? next.height_mm : 0);
     const size = near.width / 5, small = 12.5 * size / ($("inset").clientWidth || 500);
     set("inset", { viewBox: `${at - 0.86 * size} ${-(lower + 0.62 * size)} ${size} ${size}` });
     const path = (points) => (points.length ? `M${points.map(([x, y]) => `${x},${-y}`).join("L")}Z` : "");

@@ -5,7 +5,7 @@ use interstage::rig::Rig;
 use serde::Serialize;
 use serde_json::{Map, Value};
 
-use crate::record::{CrossingLine, Recording, Tick};
+use crate::record::{CrossingLine, Recording, Row};
 use crate::scenario::Scenario;
 
 /// Rows kept of a crossing's surroundings, at most.
@@ -16,13 +16,12 @@ const ROWS: (usize, usize) = (2500, 1500);
 pub(super) const AROUND_S: (f64, f64) = (0.5, 0.8);
 
 /// A column of [`Scene::rows`]: name, decimals, value. `NaN` becomes null.
-type Column = (&'static str, i32, fn(&Geometry, &Tick) -> f64);
+type Column = (&'static str, i32, fn(&Geometry, &Row) -> f64);
 
-pub(super) const COLUMNS: [Column; 10] = [
+pub(super) const COLUMNS: [Column; 9] = [
     ("t_s", 3, |_, row| row.controller.t_s),
     ("position_mm", 3, |_, row| row.position_mm()),
     ("radius_mm", 3, |_, row| row.known(|t| t.radius_true_mm, |c| c.radius_mm)),
-    ("compression_mm", 3, |_, row| row.compression_mm()),
     ("preload_n", 2, |_, row| row.known(|t| t.preload_true_n, |c| c.preload_n)),
     ("preload_ref_n", 2, |_, row| row.controller.preload_ref_n),
     ("corner_force_n", 2, |_, row| row.of_truth(|t| t.corner_force_n)),
@@ -116,7 +115,7 @@ impl Geometry {
     }
 
     /// Height of the step whose face is nearest to `position_mm`, mm.
-    fn step_mm(&self, position_mm: f64) -> f64 {
+    fn height_mm(&self, position_mm: f64) -> f64 {
         let away = |step: &&(f64, f64)| (step.0 - position_mm).abs();
         let nearest = self.steps.iter().min_by(|a, b| away(a).total_cmp(&away(b)));
         nearest.map_or(f64::NAN, |step| step.1)
@@ -135,7 +134,7 @@ pub(super) struct Event {
     /// Position of the face, mm.
     pub(super) face_mm: f64,
     /// Height of the step, mm.
-    pub(super) step_mm: f64,
+    pub(super) height_mm: f64,
     /// Distance before the face at the first touch, mm.
     pub(super) touch_mm: f64,
     /// Preload at the instant of the gap, N.
@@ -150,7 +149,7 @@ impl Scene {
         let summary = &recording.summary;
         let scenario = Scenario::parse("parameters", &recording.parameters, &[]).ok()?;
         let known = recording.rows.iter().filter(|row| row.position_mm().is_finite());
-        let rows: Vec<&Tick> = known.collect();
+        let rows: Vec<&Row> = known.collect();
         rows.first()?;
         let measured = rows.iter().all(|row| row.truth.is_none());
         let drawn = if measured { Map::new() } else { summary.drawn.clone() };
@@ -177,7 +176,7 @@ impl Scene {
     }
 }
 
-fn event(geometry: &Geometry, rows: &[&Tick], line: &CrossingLine) -> Event {
+fn event(geometry: &Geometry, rows: &[&Row], line: &CrossingLine) -> Event {
     let at = rows.partition_point(|row| row.controller.t_s < line.touch_s).min(rows.len() - 1);
     let gap_mm = if line.gap_mm.is_finite() { Some(line.gap_mm) } else { line.gap_measured_mm };
     Event {
@@ -185,14 +184,14 @@ fn event(geometry: &Geometry, rows: &[&Tick], line: &CrossingLine) -> Event {
         touch_s: line.touch_s,
         lift_s: line.lift_s,
         face_mm: line.step_mm,
-        step_mm: geometry.step_mm(line.step_mm),
+        height_mm: geometry.height_mm(line.step_mm),
         touch_mm: line.step_mm - rows[at].position_mm(),
         preload_n: line.preload_n,
         gap_mm: gap_mm.unwrap_or(f64::NAN),
     }
 }
 
-fn values(geometry: &Geometry, row: &Tick) -> [f64; COLUMNS.len()] {
+fn values(geometry: &Geometry, row: &Row) -> [f64; COLUMNS.len()] {
     COLUMNS.map(|(_, decimals, of)| {
         let scale = 10_f64.powi(decimals);
         // Plus zero: what rounds to zero has no sign.
@@ -202,8 +201,8 @@ fn values(geometry: &Geometry, row: &Tick) -> [f64; COLUMNS.len()] {
 
 /// About [`ROWS`] of the rows at most, dense around the crossings. The first and the last are kept,
 /// and both rows where corner or wall begins or ceases to carry.
-fn thinned<'a>(rows: &[&'a Tick], crossings: &[Event]) -> Vec<&'a Tick> {
-    let near = |row: &Tick| {
+fn thinned<'a>(rows: &[&'a Row], crossings: &[Event]) -> Vec<&'a Row> {
+    let near = |row: &Row| {
         let t_s = row.controller.t_s;
         crossings.iter().position(|crossing| {
             let (a, b) = (crossing.touch_s, crossing.lift_s);
@@ -211,7 +210,7 @@ fn thinned<'a>(rows: &[&'a Tick], crossings: &[Event]) -> Vec<&'a Tick> {
         })
     };
     let far = rows.iter().filter(|row| near(row).is_none()).count();
-    let mut kept: Vec<&Tick> = Vec::new();
+    let mut kept: Vec<&Row> = Vec::new();
     for piece in rows.chunk_by(|a, b| near(a) == near(b)) {
         let (count, most) = match near(piece[0]) {
             Some(_) => (piece.len(), ROWS_OF_ONE.min(ROWS.0 / crossings.len())),
@@ -219,12 +218,12 @@ fn thinned<'a>(rows: &[&'a Tick], crossings: &[Event]) -> Vec<&'a Tick> {
         };
         let every = count.div_ceil(most).max(1);
         let carries =
-            |row: &Tick| row.truth.map(|t| (t.corner_force_n > 0.0, t.floor_force_n > 0.0));
+            |row: &Row| row.truth.map(|t| (t.corner_force_n > 0.0, t.floor_force_n > 0.0));
         let changes = |place: usize| {
             let near = &piece[place.saturating_sub(1)..piece.len().min(place + 2)];
             near.iter().any(|row| carries(row) != carries(piece[place]))
         };
-        let is_kept = |(place, _): &(usize, &&Tick)| place % every == 0 || changes(*place);
+        let is_kept = |(place, _): &(usize, &&Row)| place % every == 0 || changes(*place);
         kept.extend(piece.iter().enumerate().filter(is_kept).map(|(_, row)| row));
     }
     if kept.last().map(|row| row.controller.tick) != rows.last().map(|row| row.controller.tick) {
@@ -249,11 +248,10 @@ mod tests {
             for (shown, is, within) in [
                 (shown[1], truth.position_true_mm, 6e-4),
                 (shown[2], truth.radius_true_mm, 6e-4),
-                (shown[3], truth.compression_true_mm, 6e-4),
-                (shown[4], truth.preload_true_n, 6e-3),
-                (shown[6], truth.corner_force_n, 6e-3),
-                (shown[7], truth.floor_force_n, 6e-3),
-                (shown[9], truth.speed_true_mm_s, 6e-3),
+                (shown[3], truth.preload_true_n, 6e-3),
+                (shown[5], truth.corner_force_n, 6e-3),
+                (shown[6], truth.floor_force_n, 6e-3),
+                (shown[8], truth.speed_true_mm_s, 6e-3),
             ] {
                 assert!((shown - is).abs() < within, "{shown} {is}");
             }
@@ -285,7 +283,7 @@ mod tests {
         assert_eq!(scene.crossings.len(), 3);
         for crossing in &scene.crossings {
             // The compression lowers the axle, so that it touches a little earlier.
-            let rigid_mm = crate::plant::wall::touch_mm(25.0, crossing.step_mm);
+            let rigid_mm = crate::plant::wall::touch_mm(25.0, crossing.height_mm);
             let earlier_mm = crossing.touch_mm - rigid_mm;
             assert!(earlier_mm > 0.0 && earlier_mm < 0.6, "{crossing:?} {rigid_mm}");
         }
@@ -297,8 +295,8 @@ mod tests {
         recording.rows.iter_mut().for_each(|row| row.truth = None);
         let scene = Scene::new(&recording).unwrap();
         assert!(scene.measured);
-        assert!(scene.rows.iter().all(|row| row[6].is_nan() && row[7].is_nan()));
-        let clearances = scene.rows.iter().map(|row| row[8]).filter(|gap| gap.is_finite());
+        assert!(scene.rows.iter().all(|row| row[5].is_nan() && row[6].is_nan()));
+        let clearances = scene.rows.iter().map(|row| row[7]).filter(|gap| gap.is_finite());
         let least = clearances.fold(f64::INFINITY, f64::min);
         assert!((2.0..3.0).contains(&least), "{least}");
         assert!(!scene.json().contains("NaN"));

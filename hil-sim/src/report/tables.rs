@@ -61,7 +61,7 @@ pub(super) fn crossings(crossings: &[CrossingLine]) -> String {
     if crossings.is_empty() {
         return "<p>No crossing is complete in the log.</p>\n".to_owned();
     }
-    let names = COLUMNS.iter().map(|column| format!("{}<br>{}", column.name, column.unit));
+    let names = COLUMNS.iter().map(|column| format!("{}<br>{}", column.title, column.unit));
     let head = std::iter::once("step".to_owned()).chain(names).chain(["slowed<br>by".to_owned()]);
     let head: Vec<String> = head.collect();
     let rows = crossings.iter().map(|line| {
@@ -118,6 +118,8 @@ type Truth = (fn(&CrossingLine) -> f64, fn(f64, f64) -> String);
 
 pub(crate) struct Column {
     pub(crate) name: &'static str,
+    /// Its name in tables, as that in plots.
+    pub(crate) title: &'static str,
     pub(crate) unit: &'static str,
     pub(crate) decimals: usize,
     pub(crate) of: fn(&CrossingLine) -> Option<f64>,
@@ -134,15 +136,15 @@ impl Column {
         decimals: usize,
         of: fn(&CrossingLine) -> Option<f64>,
     ) -> Self {
-        Self { name, unit, decimals, of, truth: None, on_terminal: true }
+        Self { name, title: name, unit, decimals, of, truth: None, on_terminal: true }
     }
 
     /// Compared with the true gap.
-    const fn of_gap(self) -> Self {
+    const fn of_gap(self, title: &'static str) -> Self {
         let error = |error, truth| {
             format!("{} µm, {} %", signed(1e3 * error, 0), signed(100.0 * error / truth, 1))
         };
-        Self { truth: Some((|c| c.gap_mm, error)), ..self }
+        Self { title, truth: Some((|c| c.gap_mm, error)), ..self }
     }
 
     const fn off_terminal(self) -> Self {
@@ -153,8 +155,10 @@ impl Column {
 /// All of them, after the step's number.
 pub(crate) const COLUMNS: [Column; 13] = [
     Column::new("gap", "mm", 3, |c| Some(c.gap_mm)),
-    Column::new("predicted", "mm", 3, |c| c.gap_predicted_mm).of_gap().off_terminal(),
-    Column::new("measured", "mm", 3, |c| c.gap_measured_mm).of_gap(),
+    Column::new("predicted", "mm", 3, |c| c.gap_predicted_mm)
+        .of_gap("gap, predicted")
+        .off_terminal(),
+    Column::new("measured", "mm", 3, |c| c.gap_measured_mm).of_gap("gap, measured"),
     Column::new("speed", "mm/s", 2, |c| Some(c.speed_mm_s)),
     Column::new("preload", "N", 2, |c| Some(c.preload_n)),
     Column::new("peak preload", "N", 2, |c| Some(c.peak_preload_n)).off_terminal(),

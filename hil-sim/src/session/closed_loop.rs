@@ -16,7 +16,7 @@ use crate::plant::draw::PlantParameters;
 use crate::plant::limits::Refusal;
 use crate::plant::rig::{Drives, VirtualRig};
 use crate::plant::sensors::{Codes, Sensors};
-use crate::record::{Controller as Columns, Recording, RunRecorder};
+use crate::record::{Columns, Recording, RunRecorder};
 use crate::scenario::{Direction, Scenario, TICK_S};
 
 /// A run in progress.

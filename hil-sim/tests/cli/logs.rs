@@ -1,26 +1,16 @@
 //! `rig capture`, `rig replay`, `rig report`, `rig live`.
 
-use hil_sim::record::{Decoder, Item};
 use hil_sim::scenario::Scenario;
 use hil_sim::session;
+use interstage::log::SCHEMA;
 use serde_json::Value;
 
-use crate::record::logs::{channel, data};
+use crate::record::logs::{data, frames};
 
 use super::{
     Folder, code, ends_with, folder, good_in, json, number, object, refused_in, rig_in, stderr,
     stdout,
 };
-
-/// The frames of a deployment.
-fn frames() -> Vec<Vec<u8>> {
-    let stream = session::run(&Scenario::default(), session::Options::ROWS).expect("a run").stream;
-    let mut frames = Vec::new();
-    Decoder::new().read(&stream, &mut |item| {
-        frames.extend(if let Item::Frame(bytes) = item { Some(bytes) } else { None });
-    });
-    frames
-}
 
 /// A folder with these frames in `line.bin`.
 fn line(frames: &[Vec<u8>]) -> Folder {
@@ -34,7 +24,7 @@ const CAPTURE: [&str; 6] = ["capture", "--stream", "line.bin", "--out", "out", "
 
 #[test]
 fn a_recorded_stream_becomes_files_that_give_the_same_bits() {
-    let at = &line(&frames());
+    let at = &line(&frames(&data("deploy.mcap")));
     let caught = object(&good_in(at, &CAPTURE));
     assert!(number(&caught, "ticks") > 4500.0);
     assert_eq!(number(&caught, "lost_frames"), 0.0);
@@ -47,7 +37,7 @@ fn a_recorded_stream_becomes_files_that_give_the_same_bits() {
 
 #[test]
 fn missing_frames_give_exit_code_1_and_a_mark_in_the_log() {
-    let mut frames = frames();
+    let mut frames = frames(&data("deploy.mcap"));
     frames.remove(300);
     let at = &line(&frames);
     let caught = object(&ends_with(1, at, &CAPTURE));
@@ -59,7 +49,7 @@ fn missing_frames_give_exit_code_1_and_a_mark_in_the_log() {
 
 #[test]
 fn a_log_that_was_tampered_with_shows_its_first_difference() {
-    let at = &line(&frames());
+    let at = &line(&frames(&data("deploy.mcap")));
     good_in(at, &CAPTURE);
     let csv = at.join("out/log.csv");
     let table = std::fs::read_to_string(&csv).expect("readable");
@@ -96,6 +86,23 @@ fn a_log_has_its_report_and_two_logs_their_comparison() {
     let change = number(gap, "b") - number(gap, "a");
     assert!(change != 0.0 && (number(gap, "change") - change).abs() < 1e-12);
     assert!(page("a/log.compare.html").contains("B - A"));
+}
+
+/// A kept log, which is not written again with the fixtures: its page has every crossing, and every
+/// tick is run again. A change of what is in a frame changes `LAYOUT` in `src/log/identity.rs`.
+#[test]
+fn a_kept_log_is_shown_and_run_through_or_refused_by_the_number_of_its_layout() {
+    let at = &folder();
+    std::fs::copy(data("released/layout-9.mcap"), at.join("kept.mcap")).expect("copied");
+    if SCHEMA != 9 {
+        return refused_in(at, &["report", "kept.mcap"], &["kept.mcap", "frames of schema 9"]);
+    }
+    good_in(at, &["report", "kept.mcap"]);
+    let page = std::fs::read_to_string(at.join("kept.html")).expect("a page");
+    assert_eq!(page.matches("<h3>Crossing ").count(), 3);
+    let replayed = &object(&rig_in(at, &["replay", "kept.mcap", "--json"]))["logs"][0];
+    // Another controller than that of the log differs somewhere.
+    assert!(replayed["equal"] == true || replayed["difference"].is_object(), "{replayed}");
 }
 
 /// A capture with resets of the board in it: every start has its own clock and its own page.
@@ -187,8 +194,7 @@ fn a_log_of_other_parameters_is_refused_until_they_are_given() {
     // A log that contains its parameters can be run again as it is.
     good_in(at, &["replay", "log.mcap"]);
     // The stream contains nothing but their hash.
-    let bytes = std::fs::read(at.join("log.mcap")).expect("there");
-    std::fs::write(at.join("line.bin"), channel(&bytes)).expect("written");
+    std::fs::write(at.join("line.bin"), frames(&at.join("log.mcap")).concat()).expect("written");
     refused_in(at, &["replay", "line.bin"], &["made with parameters"]);
     good_in(at, &["replay", "line.bin", set[0], set[1]]);
 }

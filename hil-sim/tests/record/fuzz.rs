@@ -17,7 +17,7 @@ use hil_sim::replay::replay;
 use hil_sim::scenario::Scenario;
 use interstage::rig::Rig;
 
-use super::logs::{channel, data};
+use super::logs::{data, frames};
 use mutate::{Chance, fuzz, mutant};
 
 fn text(bytes: &[u8]) -> String {
@@ -50,13 +50,9 @@ fn overrides() {
     });
 }
 
-fn fixture(name: &str) -> Vec<u8> {
-    fs::read(data(name)).expect("a fixture")
-}
-
 /// The beginning of a fixture's frames as on the channel.
 fn beginning(name: &str) -> Vec<u8> {
-    channel(&fixture(name))[..8000].to_vec()
+    frames(&data(name)).concat()[..8000].to_vec()
 }
 
 /// Reads a file of these bytes, which may be refused.
@@ -83,7 +79,7 @@ fn logs() {
 
 #[test]
 fn mcap_files() {
-    fuzz("MCAP files", &[fixture("deploy.mcap")], 300, 4.0, read);
+    fuzz("MCAP files", &[fs::read(data("deploy.mcap")).expect("a fixture")], 300, 4.0, read);
 }
 
 #[test]

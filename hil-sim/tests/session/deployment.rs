@@ -4,7 +4,7 @@
 use std::sync::LazyLock;
 
 use crate::common::{DIRECTIONS, NO_SLIP_MM, RIGS, STEP_CODES, end_mm, scenario};
-use hil_sim::record::{Controller, MODE_NAMES, Summary, Tick, TrueState};
+use hil_sim::record::{Columns, MODE_NAMES, Row, Summary, TrueState};
 use hil_sim::scenario::{ControllerKind, Direction, Scenario};
 use hil_sim::session::{Options, run};
 use hil_sim::testing::long;
@@ -19,7 +19,7 @@ struct Run {
     name: String,
     scenario: Scenario,
     summary: Summary,
-    rows: Vec<Tick>,
+    rows: Vec<Row>,
     nominal: bool,
 }
 
@@ -163,7 +163,7 @@ fn gaps_stay_near_the_reference_with_the_preload_reached_before_every_corner() {
             assert!(range.contains(&part) || first && enough, "{name}, {}: {part}", line.index);
             assert!(line.lead_time_s.is_some(), "{name}: the controller reports it");
             let touch = (1e3 * line.touch_s) as usize;
-            let reached = |row: &Tick| {
+            let reached = |row: &Row| {
                 let wanted = row.controller.preload_ref_n;
                 row.truth.expect("truth").preload_true_n >= wanted * (1.0 - REACHED_PART)
             };
@@ -255,11 +255,9 @@ fn a_crossing_is_never_slower_than_the_least_speed() {
     for Run { name, scenario, summary, rows, .. } in RUNS.iter() {
         let least = scenario.rig.drive.min_crossing_speed_mm_s;
         for line in &summary.crossings {
-            let on_corner =
-                |row: &&Tick| (line.touch_s..=line.lift_s).contains(&row.controller.t_s);
-            let speeds =
-                rows.iter().filter(on_corner).map(|row| row.of_truth(|t| t.speed_true_mm_s));
-            let speeds: Vec<f64> = speeds.map(f64::abs).collect();
+            let on_corner = |row: &&Row| (line.touch_s..=line.lift_s).contains(&row.controller.t_s);
+            let speed = |row: &Row| row.of_truth(|t| t.speed_true_mm_s).abs();
+            let speeds: Vec<f64> = rows.iter().filter(on_corner).map(speed).collect();
             assert!(speeds.len() > 100, "{name} step {}: {} rows", line.index, speeds.len());
             // A wheel that brakes lags behind its profile: the mean of a tenth of a second counts.
             let means = speeds.windows(100).map(|span| span.iter().sum::<f64>() / 100.0);
@@ -277,11 +275,11 @@ fn the_preload_returns_to_cruise_after_the_last_step() {
         let last = run.rows.iter().rfind(|row| row.controller.mode == mode("cruise"));
         let last = last.expect("the wall behind the last step");
         assert!((last.controller.preload_ref_n - cruise).abs() < 0.01, "{}", run.name);
-        let preload = |row: &Tick| row.of_truth(|t| t.preload_true_n);
+        let preload = |row: &Row| row.of_truth(|t| t.preload_true_n);
         // A retraction ends 4 mm behind the last step, before the screw has arrived: since it was
         // released it has run at its slew, behind dead time and lags.
         let lift_s = run.summary.crossings.last().expect("crossings").lift_s;
-        let is_released = |row: &&Tick| {
+        let is_released = |row: &&Row| {
             row.controller.t_s > lift_s && (row.controller.preload_ref_n - cruise).abs() < 0.01
         };
         let released = run.rows.iter().find(is_released).expect("released");
@@ -340,7 +338,7 @@ fn the_same_seed_gives_the_same_run_to_the_bit_and_another_seed_another() {
 
 #[test]
 fn reported_values_follow_the_true_ones() {
-    type Pair = fn(&Controller, &TrueState) -> (f64, f64);
+    type Pair = fn(&Columns, &TrueState) -> (f64, f64);
     let pairs: [(&str, Pair); 4] = [
         ("position", |seen, t| (seen.position_mm, t.position_true_mm)),
         ("preload", |seen, t| (seen.preload_n, t.preload_true_n)),
@@ -378,6 +376,17 @@ fn reported_values_follow_the_true_ones() {
         assert!(!nominal || bias.abs() < 0.02, "{name}: preload bias {bias}");
         let speed = (squares / f64::from(moving)).sqrt();
         assert!(speed < lunge, "{name}: speed off by {speed} mm/s, rms");
+    }
+}
+
+#[test]
+fn the_true_compression_is_the_one_that_its_sensor_looks_at() {
+    let sets = ["mismatch.compression_compliance_mm_per_n=0.01".to_owned()];
+    let scenario = Scenario::resolve(None, None, &sets).expect("a scenario");
+    let rows = run(&scenario, Options::ROWS).expect("a run").rows;
+    for row in rows.iter().filter(|row| row.controller.mode >= mode("cruise")) {
+        let off = row.controller.compression_mm - row.of_truth(|t| t.compression_true_mm);
+        assert!(off.abs() < 0.13, "off by {off} at {} s", row.controller.t_s);
     }
 }
 

@@ -1,6 +1,6 @@
 //! Treads that the controller is not told of.
 
-use hil_sim::record::{Recording, Tick};
+use hil_sim::record::{Recording, Row};
 use hil_sim::session::{Options, run};
 
 use crate::common::overridden;
@@ -35,7 +35,7 @@ fn on_a_thick_tread_the_gap_holds_and_is_measured() {
 fn a_slow_wheel_does_not_lunge_where_its_corner_is_detected() {
     let (recording, _) = deployed(&["run.seed=857", "run.mismatch=wide"]);
     for line in &recording.summary.crossings {
-        let before = |row: &&Tick| (line.lift_s - 0.15..=line.lift_s).contains(&row.controller.t_s);
+        let before = |row: &&Row| (line.lift_s - 0.15..=line.lift_s).contains(&row.controller.t_s);
         let speeds = recording.rows.iter().filter(before);
         let fastest = speeds.map(|row| row.controller.wheel_speed_mm_s).fold(0.0, f64::max);
         assert!((1.0..2.5).contains(&fastest), "step {}: {fastest} mm/s", line.index);

@@ -1,5 +1,6 @@
 use super::*;
 use crate::record::Recording;
+use crate::record::read::tests::read;
 use crate::scenario::Scenario;
 use crate::session;
 use interstage::log::{LogEncoder, identity};
@@ -53,26 +54,18 @@ fn decode(bytes: &[u8], cut: usize) -> (Vec<Item>, Counts) {
 }
 
 fn ticks(items: &[Item]) -> Vec<u32> {
-    let at = |item: &Item| match item {
-        Item::Tick(record, _) => Some(record.at()),
-        _ => None,
-    };
+    let at = |item: &Item| if let Item::Tick(record, _) = item { Some(record.at()) } else { None };
     items.iter().filter_map(at).collect()
 }
 
 fn marks(items: &[Item]) -> Vec<Mark> {
-    let mark = |item: &Item| match item {
-        Item::Mark(mark) => Some(*mark),
-        _ => None,
-    };
+    let mark = |item: &Item| if let Item::Mark(mark) = item { Some(*mark) } else { None };
     items.iter().filter_map(mark).collect()
 }
 
 fn bytes_of(items: &[Item]) -> Vec<u8> {
-    let bytes = |item: &Item| match item {
-        Item::Frame(bytes) => bytes.clone(),
-        _ => Vec::new(),
-    };
+    let bytes =
+        |item: &Item| if let Item::Frame(bytes) = item { bytes.clone() } else { Vec::new() };
     items.iter().flat_map(bytes).collect()
 }
 
@@ -197,18 +190,25 @@ fn ticks_that_did_not_run_are_distinguished_from_those_not_logged() {
         [(true, Mark::Overrun { ticks: 3 }), (false, Mark::Skipped { ticks: 3 })]
     {
         let input = |now| Input { now, overrun: overrun && now == 15, ..Input::default() };
-        let encoder = LogEncoder::new(Identity::default());
+        let encoder = LogEncoder::new(Identity { schema: SCHEMA, ..Identity::default() });
         let bytes = stream(encoder, &[10, 11, 15].map(input));
-        let (items, _) = decode(&bytes, 10);
-        let known = |mark: &Mark| !matches!(mark, Mark::Schema { .. });
-        assert_eq!(marks(&items).into_iter().filter(known).collect::<Vec<_>>(), [expected]);
+        assert_eq!(marks(&decode(&bytes, 10).0), [expected]);
     }
 }
 
 #[test]
-fn another_layout_is_named_by_its_number() {
-    let identity = Identity { schema: 99, ..Identity::default() };
-    let bytes = stream(LogEncoder::new(identity), &[Input::default()]);
-    let (items, _) = decode(&bytes, 10);
-    assert_eq!(marks(&items)[0], Mark::Schema { found: 99 });
+fn another_layout_is_refused_by_its_number_and_not_decoded_until_a_known_one_follows() {
+    let inputs: [Input; 1100] =
+        std::array::from_fn(|at| Input { now: at as u32, ..Input::default() });
+    let of = |schema| LogEncoder::new(Identity { schema, ..Identity::default() });
+    let [other, known] = [99, SCHEMA].map(|schema| stream(of(schema), &inputs));
+    let (items, _) = decode(&[&other[..], &known].concat(), 10);
+    let mark = Mark::Schema { found: 99 };
+    assert_eq!(marks(&items), [mark, mark, Mark::Restart]);
+    assert!(ticks(&items).into_iter().eq(0..1100));
+    // Also from behind its first identity on.
+    for from in [0, 500] {
+        let why = read(&other[from..]).unwrap_err().to_string();
+        assert!(why.contains("frames of schema 99") && why.lines().count() == 1, "{why}");
+    }
 }

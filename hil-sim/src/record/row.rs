@@ -1,6 +1,6 @@
 //! One row a tick: the controller's inputs and outputs, and the plant's truth beside them.
 //!
-//! The fields of [`Controller`] and [`TrueState`] are the columns of CSV, MCAP and JSON; serde
+//! The fields of [`Columns`] and [`TrueState`] are the columns of CSV, MCAP and JSON; serde
 //! derives their names, order and schema.
 //!
 //! A new column of the plant is a field of [`TrueState`]. One of the controller is a line of
@@ -22,7 +22,7 @@ use super::columns::{
 use super::summary::nan;
 use crate::plant::rig::Truth;
 
-/// Names of the numbers in `Controller::mode`.
+/// Names of the numbers in `Columns::mode`.
 pub const MODE_NAMES: [&str; 14] = [
     "boot",
     "self-test",
@@ -90,21 +90,21 @@ fn split(mode: Mode) -> (u8, bool, u8) {
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct Tick {
+pub struct Row {
     /// The controller's inputs and outputs.
     #[serde(flatten)]
-    pub controller: Controller,
+    pub controller: Columns,
     /// The plant's truth, if there is a plant.
     #[serde(flatten)]
     pub truth: Option<TrueState>,
 }
 
-impl<'de> Deserialize<'de> for Tick {
+impl<'de> Deserialize<'de> for Row {
     /// Reads both halves from one object: `flatten` would lose every number if another crate
     /// of the build enables `arbitrary_precision` of `serde_json`.
     fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
         let row = serde_json::Value::deserialize(from)?;
-        let controller = Controller::deserialize(&row).map_err(D::Error::custom)?;
+        let controller = Columns::deserialize(&row).map_err(D::Error::custom)?;
         let truth = row.get("position_true_mm").map(|_| TrueState::deserialize(&row));
         Ok(Self { controller, truth: truth.transpose().map_err(D::Error::custom)? })
     }
@@ -129,7 +129,7 @@ macro_rules! controller {
         /// which an `f64` represents. What is unknown, or absent in a log, is `NaN`.
         #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, DocumentedFields)]
         #[serde(default)]
-        pub struct Controller {
+        pub struct Columns {
             /// Ticks since boot, 1 ms each.
             pub tick: u32,
             /// Time since boot, s.
@@ -178,7 +178,7 @@ macro_rules! controller {
             pub pretightener_on: bool,
         }
 
-        impl Controller {
+        impl Columns {
             /// The quantities, in the order of their columns.
             pub(crate) const QUANTITIES: &[Column] = &[$(Column {
                 name: stringify!($column),
@@ -271,13 +271,13 @@ macro_rules! controller {
 }
 interstage::sensors!(with_quantities);
 
-impl Default for Controller {
+impl Default for Columns {
     fn default() -> Self {
         Self::unknown(0)
     }
 }
 
-impl Controller {
+impl Columns {
     /// All other inputs and outputs of the tick.
     pub(crate) const fn flags(&self) -> Flags {
         Flags(self.flags)
@@ -303,7 +303,7 @@ impl Controller {
 
 /// The plant's truth at a tick, before it moves. A column that another version's log lacks is
 /// `NaN`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, DocumentedFields)]
 pub struct TrueState {
     /// Axial position of the wheel centre, mm.
     pub position_true_mm: f64,
@@ -316,7 +316,7 @@ pub struct TrueState {
     /// Distance of the wheel centre from the pillar axis, mm.
     #[serde(default = "nan")]
     pub radius_true_mm: f64,
-    /// Largest tread compression, mm.
+    /// Compression of the tread where its sensor looks, mm.
     #[serde(default = "nan")]
     pub compression_true_mm: f64,
     /// Clearance of the nearest step's root from the undeformed wheel, mm; NaN away from a step.
@@ -349,7 +349,7 @@ impl From<&Truth> for TrueState {
             speed_true_mm_s: truth.speed_mm_s,
             preload_true_n: truth.preload_n,
             radius_true_mm: truth.radius_mm,
-            compression_true_mm: truth.depth_mm,
+            compression_true_mm: truth.compression_mm,
             root_clearance_mm: truth.root_clearance_mm.unwrap_or(f64::NAN),
             corner_force_n: truth.corner_n,
             floor_force_n: truth.floor_n,
@@ -361,10 +361,10 @@ impl From<&Truth> for TrueState {
     }
 }
 
-impl Tick {
+impl Row {
     /// A tick of zeros, which shows the form of each column.
     pub(super) fn example(with_truth: bool) -> Self {
-        let controller = Controller::of(&Record::default(), &SensorFrame::default());
+        let controller = Columns::of(&Record::default(), &SensorFrame::default());
         Self { controller, truth: with_truth.then(TrueState::default) }
     }
 
@@ -377,7 +377,7 @@ impl Tick {
     pub(crate) fn known(
         &self,
         truth: impl Fn(&TrueState) -> f64,
-        controller: impl Fn(&Controller) -> f64,
+        controller: impl Fn(&Columns) -> f64,
     ) -> f64 {
         self.truth.as_ref().map_or_else(|| controller(&self.controller), truth)
     }
@@ -385,11 +385,6 @@ impl Tick {
     /// Axial position, mm: the true one, or by odometry where there is none.
     pub fn position_mm(&self) -> f64 {
         self.known(|truth| truth.position_true_mm, |seen| seen.position_mm)
-    }
-
-    /// Compression of the tread, mm: the true one, or as it was measured.
-    pub(crate) fn compression_mm(&self) -> f64 {
-        self.known(|truth| truth.compression_true_mm, |seen| seen.compression_mm)
     }
 }
 
@@ -413,12 +408,12 @@ mod tests {
             }
             .with_quantities(quantities.map(Q16::from_bits));
             let record = Record { telemetry, ..Record::default() };
-            let controller = Controller::of(&record, &SensorFrame::default());
+            let controller = Columns::of(&record, &SensorFrame::default());
             prop_assert_eq!(controller.telemetry(), Some(telemetry));
             // JSON keeps it too.
-            let tick = Tick { controller, truth: None };
+            let tick = Row { controller, truth: None };
             let text = serde_json::to_string(&tick).unwrap();
-            prop_assert_eq!(serde_json::from_str::<Tick>(&text).unwrap(), tick);
+            prop_assert_eq!(serde_json::from_str::<Row>(&text).unwrap(), tick);
         }
     }
 
@@ -426,16 +421,16 @@ mod tests {
     fn no_face_ahead_is_no_number() {
         let telemetry = Telemetry { distance: Q16::MAX, ..Telemetry::default() };
         let record = Record { telemetry, ..Record::default() };
-        let tick = Controller::of(&record, &SensorFrame::default());
+        let tick = Columns::of(&record, &SensorFrame::default());
         assert_eq!(tick.distance_mm, None);
         assert_eq!(tick.telemetry(), Some(telemetry));
     }
 
     #[test]
     fn of_an_unknown_tick_only_the_time_is_a_number() {
-        let columns = |tick: Controller| serde_json::to_value(tick).unwrap();
-        let known = columns(Tick::example(false).controller);
-        let unknown = columns(Controller::unknown(5));
+        let columns = |tick: Columns| serde_json::to_value(tick).unwrap();
+        let known = columns(Row::example(false).controller);
+        let unknown = columns(Columns::unknown(5));
         let numbers = known.as_object().unwrap().iter().filter(|(_, value)| value.is_f64());
         assert!(numbers.clone().count() > Telemetry::QUANTITIES, "{known}");
         for (name, _) in numbers {
@@ -448,13 +443,13 @@ mod tests {
         let held = Fault::ALL.into_iter().map(Mode::FaultHold);
         for mode in Mode::WITHOUT_FAULT.map(|(mode, _)| mode).into_iter().chain(held) {
             let (number, retracts, fault) = split(mode);
-            let tick = Controller { mode: number, retracts, fault, ..Controller::default() };
+            let tick = Columns { mode: number, retracts, fault, ..Columns::default() };
             assert_eq!(tick.mode(), Some(mode));
             let name = MODE_NAMES[usize::from(number)][..4].replace('-', "");
             assert!(format!("{mode:?}").to_lowercase().contains(&name));
         }
         for (mode, retracts) in [(OFF, false), (3, true), (FAULT_HOLD, false), (200, true)] {
-            let tick = Controller { mode, retracts, ..Controller::default() };
+            let tick = Columns { mode, retracts, ..Columns::default() };
             assert_eq!(tick.mode(), None, "{mode}");
         }
         assert_eq!((stage_name(0), stage_name(6)), ("unknown stage", "continuous"));
