@@ -66,7 +66,7 @@ fn damage_that_only_the_light_reports_is_found() {
     let bit = f64::from(8 * (copies + 0x115 - 0x0800_0000) + 4);
     let image = HARDWARE.iter().find(|entry| entry.target == Target::Image).expect("an image");
     let entry = Box::leak(Box::new(Entry { range: (bit, bit), ..*image }));
-    let outcome = tried(vec![Case::Injected(entry)], 1);
+    let outcome = tried(vec![Case(entry)], 1);
     let line = &outcome.matrix[0];
     assert_eq!(line.restarted(), Some("image damaged, by the light alone"), "{line:#?}");
     let latency_ms = line.latency_ms.expect("a latency");

@@ -13,7 +13,7 @@ use crate::plant::draw::STOP_ROOM_MM;
 use crate::plant::rig::Truth;
 use crate::plant::wall::touch_mm;
 use crate::scenario::injection::{Injection, Kind, Target, entry, restarts};
-use crate::scenario::{Scenario, StepAnomaly, TICK_S};
+use crate::scenario::{Scenario, TICK_S};
 
 /// Time within which 123 finds a wheel off its reference, s: two spans of the cross-check, which are
 /// the controller's on every rig.
@@ -160,9 +160,9 @@ impl Judge {
         let reset = fault.filter(|fault| fault.target == Target::Reset);
         let slips = matches!(target, Some(Target::Wheel | Target::Tread));
         let commanded = target == Some(Target::Commands);
-        let entry = fault.and_then(|fault| entry(fault.target, fault.kind));
-        let anomaly = scenario.run.anomalies.first().map(StepAnomaly::codes);
-        let codes = entry.map(|entry| entry.codes).or(anomaly);
+        let anomaly = scenario.run.anomalies.first().map(|step| (Target::Step, step.kind()));
+        let injected = fault.map(|fault| (fault.target, fault.kind)).or(anomaly);
+        let codes = injected.and_then(|(of, kind)| entry(of, kind)).map(|entry| entry.codes);
         Self {
             bounds: Bounds::of(&scenario.rig, slips, !scenario.run.anomalies.is_empty()),
             codes,

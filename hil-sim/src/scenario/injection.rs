@@ -4,7 +4,7 @@ mod catalogue;
 
 use serde::{Deserialize, Serialize};
 
-pub use catalogue::{CATALOGUE, Entry, HARDWARE, entry, restarts};
+pub use catalogue::{CATALOGUE, Entry, HARDWARE, STEPS, entry, restarts};
 use interstage::sense::raw::SensorId;
 
 use crate::table::label;
@@ -155,6 +155,8 @@ pub enum Target {
     Magnet,
     StopWire,
     OptionBytes,
+    /// A step of the wall; a scenario has it among its anomalies.
+    Step,
     #[serde(untagged)]
     Sensor(SensorId),
 }
@@ -201,6 +203,10 @@ pub enum Kind {
     TwoWrongBits,
     Halted,
     Shorted,
+    Early,
+    Late,
+    Missing,
+    Higher,
 }
 
 /// The name of a word of the scenario.

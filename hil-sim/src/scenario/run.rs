@@ -4,7 +4,7 @@
 use documented::DocumentedFields;
 use serde::{Deserialize, Serialize};
 
-use super::injection::Injection;
+use super::injection::{Injection, Kind};
 
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, DocumentedFields)]
 #[serde(deny_unknown_fields)]
@@ -129,14 +129,14 @@ pub enum StepAnomaly {
 }
 
 impl StepAnomaly {
-    /// Codes that name it.
-    pub(crate) const fn codes(&self) -> &'static [u16] {
+    /// Its kind in the catalogue of faults.
+    pub(crate) const fn kind(&self) -> Kind {
         match self {
-            Self::Early { .. } => &[201, 124],
-            Self::Late { .. } => &[202, 203, 124],
-            Self::Missing { .. } => &[202, 203, 132],
-            Self::Higher { .. } => &[219],
-            Self::Extra { .. } => &[204],
+            Self::Early { .. } => Kind::Early,
+            Self::Late { .. } => Kind::Late,
+            Self::Missing { .. } => Kind::Missing,
+            Self::Higher { .. } => Kind::Higher,
+            Self::Extra { .. } => Kind::Doubled,
         }
     }
 
