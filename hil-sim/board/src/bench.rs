@@ -7,6 +7,7 @@
 use super::chip::Motor;
 use super::error::{BoardError, ImageError};
 use super::fault_injector::{BoardInjector, Saving};
+use super::faults;
 use super::log::{Line, Reader, Strings};
 use super::machine::Machine;
 use super::peripherals::HZ;
@@ -18,6 +19,7 @@ use hil_sim::plant::rig::{Drives, VirtualRig};
 use hil_sim::plant::sensors::{Codes, Sensors};
 use hil_sim::record::letter;
 use hil_sim::scenario::Scenario;
+use hil_sim::scenario::injection::Injection;
 use hil_sim::session;
 use interstage::sense::raw::{EncoderCount, SensorId};
 
@@ -78,6 +80,10 @@ impl<'a> Bench<'a> {
         scenario: &Scenario,
         mistakes: &[Mistake],
     ) -> Result<Self, ImageError> {
+        let mut scenario = scenario.clone();
+        let faults: Vec<Injection> = mistakes.iter().flat_map(|mistake| mistake.faults()).collect();
+        scenario.run.faults.extend(&faults);
+        let scenario = &scenario;
         let mut wiring = Wiring::with(mistakes);
         let mut parameters = scenario.plant();
         wiring.build(&scenario.rig, &mut parameters);
@@ -102,6 +108,8 @@ impl<'a> Bench<'a> {
         };
         bench.connect();
         bench.set_sensors(codes);
+        // A probe sees them before the first instruction.
+        faults.iter().try_for_each(|fault| faults::switch(&mut bench.machine, fault, true))?;
         Ok(bench)
     }
 

@@ -4,8 +4,9 @@ use std::cell::RefCell;
 use std::rc::Rc;
 use std::time::Duration;
 
-use hil_sim::bringup::{Action, BringupError, Operator, Question, Seen, Sensor};
+use hil_sim::bringup::{Action, BringupError, Operator, Question, Seen};
 use hil_sim::probe::{Port, PortError};
+use interstage::sense::raw::SensorId;
 
 use super::bench::Bench;
 use super::port::gone;
@@ -125,9 +126,9 @@ impl<O: Operator> Operator for Person<'_, O> {
         })
     }
 
-    fn put(&mut self, sensor: Sensor, is_second: bool) -> Result<f64, BringupError> {
+    fn put(&mut self, sensor: SensorId, is_second: bool) -> Result<f64, BringupError> {
         let (plant, which) = (&mut self.bench.borrow_mut().plant, usize::from(is_second));
-        if sensor == Sensor::Preload {
+        if sensor == SensorId::PreloadSensor {
             plant.lift(WEIGHTS[which].1, None);
             return Ok(WEIGHTS[which].0);
         }

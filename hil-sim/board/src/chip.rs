@@ -59,8 +59,9 @@ pub struct Defects {
     pub timer_flags_stick: bool,
     /// The line of the external interrupts 10 to 15, the button's, stays active.
     pub button_storm: bool,
-    /// The wire of the emergency stop is shorted to ground.
-    pub stop_shorted: bool,
+    /// Level of the emergency stop's line with its wire torn or shorted to ground, whatever its
+    /// button does.
+    pub stop_wire: Option<bool>,
 }
 
 /// Errors at every analogue input, parts of 2^16 of the reference.

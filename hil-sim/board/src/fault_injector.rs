@@ -6,7 +6,7 @@
 //! stays active; a hanging task loops in its next poll. In the stored parameters a bit is
 //! inverted, or a host saves new ones as soon as the drive rests, and power is lost or the
 //! reset pin is pulled during a flash operation. With a short of the emergency stop's wire, its
-//! button is pressed.
+//! button is pressed: the line does not show it.
 
 mod save;
 
@@ -22,7 +22,7 @@ use hil_sim::injector::{FaultInjector, FaultTimes};
 use hil_sim::plant::rig::VirtualRig;
 use hil_sim::plant::sensors::Codes;
 use hil_sim::scenario::Scenario;
-use hil_sim::scenario::injection::{Injection, Kind, Target};
+use hil_sim::scenario::injection::{Injection, Kind, Target, entry};
 use interstage::rig::Rig;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -102,7 +102,7 @@ impl BoardInjector {
         if injection.target == Target::HostLine {
             self.flood = on.then(|| ChaCha8Rng::seed_from_u64(1));
         }
-        if let Some(task) = task(injection) {
+        if let Some(task) = entry(injection.target, injection.kind).and_then(|entry| entry.task) {
             self.waits = true;
             self.search = on.then(|| TaskSearch::new(machine, task, INTO_POLL));
         }
@@ -116,10 +116,6 @@ impl BoardInjector {
             // At a cycle that depends on the seed.
             self.within = Some((*injection, (self.seed as f64 * 0.618_034).fract()));
             return Ok(());
-        }
-        if (injection.target, injection.kind) == (Target::StopWire, Kind::Shorted) {
-            // The button is pressed, and the short hides it.
-            faults::switch(machine, &Injection { kind: Kind::Off, ..*injection }, on)?;
         }
         faults::switch(machine, injection, on)
     }
@@ -198,21 +194,6 @@ impl BoardInjector {
             false => self.faults.times(),
         }
     }
-}
-
-/// Name of the task that is to hang.
-fn task(injection: &Injection) -> Option<&'static str> {
-    Some(match injection.target {
-        Target::Model | Target::ModelTask => "model",
-        Target::WheelEncoderTask => "wheel_encoder",
-        Target::PreloadSensorTask => "preload_sensor",
-        Target::CompressionSensorTask => "compression_sensor",
-        Target::ArmAngleTask => "arm_angle",
-        Target::TickTask => "motors",
-        Target::JournalTask => "journal",
-        Target::LineTask => "link",
-        _ => return None,
-    })
 }
 
 /// When a save is interrupted.

@@ -1,6 +1,5 @@
 //! The faults of the catalogue at the board's registers, lines and memories.
 
-use super::chip::Pin;
 use super::chip::map::PARAMETER_SETS;
 use super::core::CoreError;
 use super::elf::FLASH;
@@ -41,14 +40,9 @@ pub fn switch(machine: &mut Machine, fault: &Injection, on: bool) -> Result<(), 
             chip.settle(now);
         }
         (OptionBytes, _) => chip.flash.set_single_bank(on),
-        (StopWire, Kind::Shorted) => {
-            chip.defects.stop_shorted = on;
-            chip.settle(now);
-        }
-        (StopWire, _) => {
-            for pin in [Pin::STOP_DRIVE, Pin::STOP_PRELOAD] {
-                chip.drive(pin, on, now);
-            }
+        (StopWire, kind) => {
+            chip.defects.stop_wire = on.then_some(kind != Kind::Shorted);
+            chip.press_stop(false, now);
         }
         _ if !on => {}
         (StoredSet | SpareSet | ImageSet | Image, kind) => {

@@ -2,62 +2,44 @@
 //! has to find.
 
 use clap::ValueEnum;
-use hil_sim::bringup::{Sensor, stowed};
+use hil_sim::bringup::stowed;
 use hil_sim::plant::draw::PlantParameters;
 use hil_sim::plant::rig::Drives;
-use hil_sim::plant::sensors::Codes;
+use hil_sim::plant::sensors::{Codes, encode, with_parity};
+use hil_sim::scenario::injection::{Injection, Kind, Target};
 use interstage::rig::Rig;
+use interstage::sense::raw::SensorId::{ArmAngle, CompressionSensor, PreloadSensor};
 use interstage::sense::raw::{BridgeCode, BridgeCodes, SensorId};
 
-use super::chip::{Chip, Pin};
+use super::chip::Chip;
 
-/// Code of a sensor without load: 5 % of the converter.
-const ZERO: i32 = 3277;
-/// Codes from there to full scale: 85 %.
-const FULL: f64 = 55_704.75;
 /// Code of an open input whose pull-down is missing: it keeps some charge.
 const FLOATING: u16 = 21_000;
-/// What a sensor shows of its quantity, in percent.
-const GAINS: [(Mistake, i32); 5] = [
-    (Mistake::PreloadReversed, -100),
-    (Mistake::CompressionReversed, -100),
-    (Mistake::PreloadGain, 150),
-    (Mistake::PreloadScale, 110),
-    (Mistake::CompressionScale, 90),
-];
 /// Preload at which its sensor is at its stop, N.
 const PRELOAD_STOP_N: f64 = 13.0;
-/// By how much the angle's zero code is off, codes.
-const ANGLE_OFF: i32 = 900;
+/// By how much the angle's zero code is off, degrees.
+const ANGLE_OFF: f64 = 20.0;
 /// Friction of a wheel that cannot be turned, N.
 const BLOCKED_N: f64 = 1e4;
 
-/// A mistake in the wiring, by its name on the command line.
+/// A mistake in the wiring, by its name on the command line; [`Mistake::faults`] has those that
+/// are faults of the catalogue.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Mistake {
-    /// The option byte DBANK is 0.
     OneBank,
-    /// The angle encoder is not connected.
     AngleOpen,
     MagnetMissing,
-    /// Its chip is at the pivot's other end: the codes grow inwards from the right one at the stow end.
+    /// The angle's chip is at the pivot's other end: from the stow end on its codes grow inwards.
     ArmInwards,
-    /// The angle's zero code is far off.
     AngleZero,
-    /// The preload sensor is not connected.
     PreloadOpen,
-    /// Its bridge is reversed.
     PreloadReversed,
     /// Preload and compression sensor are exchanged.
     SensorsExchanged,
-    /// The compression sensor is not connected.
     CompressionOpen,
     CompressionReversed,
-    /// Line A of the wheel encoder is not connected.
     EncoderA,
-    /// Line B of the wheel encoder is not connected.
     EncoderB,
-    /// Neither is connected.
     EncoderOpen,
     /// Lines A and B are exchanged.
     EncoderSwapped,
@@ -76,21 +58,16 @@ pub enum Mistake {
     ReadbackReference,
     /// The motor supply is off.
     SupplyOff,
-    /// The emergency stop's contact is open.
     StopOpen,
-    /// Its line is shorted to ground.
     StopShorted,
-    /// Its second contact does not cut the motors' supply.
+    /// The emergency stop's second contact does not cut the motors' supply.
     StopSupply,
-    /// The preload sensor shows 1.5 times the preload.
     PreloadGain,
-    /// It shows a tenth too much.
     PreloadScale,
     /// The carriage has no stop at the stow end.
     NoStop,
-    /// It is at its stop at 13 N.
+    /// The preload sensor is at its stop at 13 N.
     PreloadStop,
-    /// The compression sensor shows a tenth too little.
     CompressionScale,
     /// The preload sensor has ten times its noise.
     PreloadNoise,
@@ -104,19 +81,47 @@ pub enum Mistake {
     BridgePullDowns,
 }
 
+impl Mistake {
+    /// The faults of the catalogue that it is, from the first instruction on.
+    pub fn faults(self) -> Vec<Injection> {
+        use Target::{AngleBus, EncoderLineA, EncoderLineB, Magnet, OptionBytes, Sensor, StopWire};
+        let (preload, compression) = (Sensor(PreloadSensor), Sensor(CompressionSensor));
+        let faults: &[(Target, Kind, f64)] = match self {
+            Self::OneBank => &[(OptionBytes, Kind::Off, 0.0)],
+            Self::AngleOpen => &[(AngleBus, Kind::Off, 0.0)],
+            Self::MagnetMissing => &[(Magnet, Kind::Gone, 0.0)],
+            Self::AngleZero => &[(Sensor(ArmAngle), Kind::Offset, ANGLE_OFF)],
+            Self::PreloadOpen => &[(preload, Kind::Off, 0.0)],
+            Self::PreloadReversed => &[(preload, Kind::Gain, -1.0)],
+            Self::PreloadGain => &[(preload, Kind::Gain, 1.5)],
+            Self::PreloadScale => &[(preload, Kind::Gain, 1.1)],
+            Self::CompressionOpen => &[(compression, Kind::Off, 0.0)],
+            Self::CompressionReversed => &[(compression, Kind::Gain, -1.0)],
+            Self::CompressionScale => &[(compression, Kind::Gain, 0.9)],
+            Self::EncoderA => &[(EncoderLineA, Kind::Off, 0.0)],
+            Self::EncoderB => &[(EncoderLineB, Kind::Off, 0.0)],
+            Self::EncoderOpen => &[(EncoderLineA, Kind::Off, 0.0), (EncoderLineB, Kind::Off, 0.0)],
+            Self::StopOpen => &[(StopWire, Kind::Off, 0.0)],
+            Self::StopShorted => &[(StopWire, Kind::Shorted, 0.0)],
+            _ => &[],
+        };
+        faults.iter().map(|&(target, kind, by)| Injection::at(target, kind, 0.0, by)).collect()
+    }
+}
+
 /// The wiring of a rig, and what a hand does with it.
 #[derive(Clone, Debug, Default)]
 pub struct Wiring {
     mistakes: Vec<Mistake>,
     /// The angle's code at the stow end, and that of a preload sensor at its stop.
     stowed: i32,
-    preload_stop: i32,
+    preload_stop: u16,
     /// The emergency stop is pressed.
     pub stop_pressed: bool,
     /// The motor supply is switched off.
     pub switched_off: bool,
     /// Sensors that a hand has unplugged.
-    pub unplugged: Vec<Sensor>,
+    pub unplugged: Vec<SensorId>,
 }
 
 impl Wiring {
@@ -132,8 +137,7 @@ impl Wiring {
     /// The plant of this rig as built.
     pub fn build(&mut self, rig: &Rig, plant: &mut PlantParameters) {
         self.stowed = stowed(rig).round() as i32;
-        let stop = FULL * PRELOAD_STOP_N / rig.sense.preload_full_scale_n;
-        self.preload_stop = ZERO + stop.round() as i32;
+        self.preload_stop = encode(PreloadSensor, rig, PRELOAD_STOP_N).round() as u16;
         if self.has(Mistake::PreloadNoise) {
             plant.sensors.noise.preload_sensor_n *= 10.0;
         }
@@ -156,19 +160,10 @@ impl Wiring {
 
     /// Applies what is constant, and the hand, to the chip's pins.
     pub fn connect(&self, chip: &mut Chip, now: u64) {
-        chip.flash.set_single_bank(self.has(Mistake::OneBank));
-        chip.angle.lost = self.has(Mistake::AngleOpen);
-        chip.angle.set_magnet(!self.has(Mistake::MagnetMissing));
-        let open = self.has(Mistake::EncoderOpen);
-        chip.defects.encoder_lines =
-            [open || self.has(Mistake::EncoderA), open || self.has(Mistake::EncoderB)];
         chip.defects.encoder_swapped =
             self.has(Mistake::EncoderSwapped) || self.has(Mistake::BothSwapped);
         chip.defects.drive_bridge_floats = self.has(Mistake::BridgePullDowns);
-        let pressed = self.stop_pressed && !self.has(Mistake::StopShorted);
-        let open = pressed || self.has(Mistake::StopOpen);
-        chip.drive(Pin::STOP_DRIVE, open, now);
-        chip.drive(Pin::STOP_PRELOAD, open, now);
+        chip.press_stop(self.stop_pressed, now);
     }
 
     /// What the motors get of what the bridges put out.
@@ -192,31 +187,24 @@ impl Wiring {
     /// What the board gets of what the sensors and bridges give.
     pub fn codes(&self, mut codes: Codes) -> Codes {
         codes.bridges = self.readback(codes.bridges);
-        let arm = &mut codes.sensors[SensorId::ArmAngle as usize];
-        *arm = self.arm(*arm);
-        let places = [SensorId::PreloadSensor, SensorId::CompressionSensor].map(|s| s as usize);
-        let [mut preload, mut compression] = places.map(|at| i32::from(codes.sensors[at]));
-        for (mistake, percent) in GAINS.into_iter().filter(|(mistake, _)| self.has(*mistake)) {
-            let is_compression =
-                matches!(mistake, Mistake::CompressionReversed | Mistake::CompressionScale);
-            let code = if is_compression { &mut compression } else { &mut preload };
-            *code = ZERO + (*code - ZERO) * percent / 100;
+        let [.., preload, compression, arm] = &mut codes.sensors;
+        if self.has(Mistake::ArmInwards) {
+            // The chip is at the pivot's other end.
+            *arm = with_parity((2 * self.stowed - i32::from(*arm & 0x3FFF)) as u16 & 0x3FFF);
         }
         if self.has(Mistake::PreloadStop) {
-            preload = preload.min(self.preload_stop);
+            *preload = self.preload_stop.min(*preload);
         }
-        if self.has(Mistake::PreloadOpen) || self.unplugged.contains(&Sensor::Preload) {
-            let floats = self.has(Mistake::PreloadPullDown);
-            preload = if floats { FLOATING.into() } else { 0 };
+        let is_out = |sensor| self.unplugged.contains(&sensor);
+        if is_out(PreloadSensor) {
+            *preload = if self.has(Mistake::PreloadPullDown) { FLOATING } else { 0 };
         }
-        if self.has(Mistake::CompressionOpen) || self.unplugged.contains(&Sensor::Compression) {
-            compression = 0;
+        if is_out(CompressionSensor) {
+            *compression = 0;
         }
         if self.has(Mistake::SensorsExchanged) {
-            std::mem::swap(&mut preload, &mut compression);
+            std::mem::swap(preload, compression);
         }
-        let code = |code: i32| code.clamp(0, 65_535) as u16;
-        (codes.sensors[places[0]], codes.sensors[places[1]]) = (code(preload), code(compression));
         codes
     }
 
@@ -246,19 +234,6 @@ impl Wiring {
         }
         BridgeCodes { drive, pretightener }
     }
-
-    /// The angle's frame, of a chip at the pivot's other end or with its zero elsewhere.
-    fn arm(&self, frame: u16) -> u16 {
-        let mut code = i32::from(frame & 0x3FFF);
-        if self.has(Mistake::ArmInwards) {
-            code = 2 * self.stowed - code;
-        }
-        if self.has(Mistake::AngleZero) {
-            code += ANGLE_OFF;
-        }
-        let bits = (code & 0x3FFF) as u16;
-        bits | ((bits.count_ones() & 1) as u16) << 15
-    }
 }
 
 #[cfg(test)]
@@ -278,9 +253,8 @@ mod tests {
             let mut wiring = Wiring::with(&[Mistake::PreloadStop, Mistake::ArmInwards]);
             wiring.build(&scenario.rig, &mut scenario.plant());
             let codes = |preload_n: f64, arm: f64| {
-                let arm = arm as u16;
-                let preload = 65_535.0 * (0.05 + 0.85 * preload_n / full_scale_n);
-                [0, preload.round() as u16, 0, arm | ((arm.count_ones() & 1) as u16) << 15]
+                let preload = encode(PreloadSensor, &scenario.rig, preload_n).round();
+                [0, preload as u16, 0, with_parity(arm as u16)]
             };
             let passed = |sensors| wiring.codes(Codes { sensors, bridges: BridgeCodes::default() });
             let stow = stowed(&scenario.rig).round();

@@ -2,10 +2,13 @@
 
 use std::ops::ControlFlow;
 
-use super::figures::{Counted, Scale, counted, mean};
+use interstage::rig::Rig;
+use interstage::sense::raw::SensorId;
+
+use super::figures::{Counted, counted, level};
 use super::line::{Motion, drive as drive_by, press};
-use super::motion::{CHANGED, bridge, driven, fault};
-use super::{Action, BringupError, Check, Question, Seen, Session, check};
+use super::motion::{CHANGED, bridge, driven, fault, speed};
+use super::{Action, BringupError, Check, Question, Seen, Session, row};
 use crate::table;
 
 /// Input data of port A, with the wheel encoder's lines.
@@ -40,7 +43,7 @@ pub(super) fn drive(session: &mut Session<'_, '_>) -> Result<Vec<Check>, Bringup
     let counts = counted(driven(&slow, 0));
     (session.say)(&format!("  {}", table::counted(counts.sum, "count")));
     let turned = session.operator.look(Question::Turned)?;
-    let shift = preload_change(&slow, &Scale::of(&session.expected.rig));
+    let shift = preload_change(&slow, &session.expected.rig)?;
     checks.extend(turns(&slow, counts, shift, lines, turned));
     if checks.iter().any(|check| !check.ok) {
         return Ok(checks);
@@ -48,17 +51,9 @@ pub(super) fn drive(session: &mut Session<'_, '_>) -> Result<Vec<Check>, Bringup
     session.operator.confirm("The DRIVE turns outwards, 30 % for 0.5 s, and back for 0.8 s.")?;
     let fast = session.line.moved(drive_by(FAST), 500, 300)?;
     session.line.moved(drive_by(-FAST), 800, 300)?;
-    let scale = Scale::of(&session.expected.rig);
-    let speed = |motion: &Motion| {
-        let rows = driven(motion, 0);
-        let steady = &rows[rows.len() / 2..];
-        let seconds = steady.len().saturating_sub(1).max(1) as f64 * 1e-3;
-        counted(steady).sum as f64 * scale.count_mm / seconds
-    };
-    let (v_slow, v_fast) = (speed(&slow), speed(&fast));
+    let [v_slow, v_fast] = [&slow, &fast].map(|motion| speed(motion, &session.expected.rig));
     let no_load = (v_fast - v_slow) / (FAST - SLOW);
     let wanted = session.expected.rig.drive.no_load_speed_mm_s;
-    let near = (no_load / wanted - 1.0).abs() <= 0.25;
     let friction = SLOW - v_slow / no_load;
     let rounded = (no_load * 10.0).round() / 10.0;
     // What the board has is replaced only where the measurement contradicts it.
@@ -70,9 +65,8 @@ pub(super) fn drive(session: &mut Session<'_, '_>) -> Result<Vec<Check>, Bringup
     if (no_load - proposed).abs() <= within {
         session.measured("drive.no_load_speed_mm_s", no_load, within, "two duties");
     }
-    checks.push(check(
-        "drive speed",
-        near,
+    checks.push(row::DRIVE_SPEED.by(
+        Some(no_load / wanted),
         format!("{no_load:.1} mm/s at full duty, parameter {wanted:.1}{}", fault(&fast)),
         &format!(
             "the wheel wedges where it touches the wall: hold it off; or the motor, its supply's \
@@ -81,10 +75,9 @@ pub(super) fn drive(session: &mut Session<'_, '_>) -> Result<Vec<Check>, Bringup
              drive.no_load_speed_mm_s = {rounded}"
         ),
     ));
-    if near {
-        checks.push(check(
-            "drive friction",
-            friction < 0.08,
+    if checks.iter().all(|check| check.ok) {
+        checks.push(row::DRIVE_FRICTION.by(
+            Some(friction),
             format!("{:.1} % of duty", 100.0 * friction),
             "the drive is stiff: gearbox, bearing, or the wheel drags on the wall",
         ));
@@ -107,14 +100,13 @@ fn silent_bridge(session: &mut Session<'_, '_>, slow: &Motion) -> Result<Check, 
         "the drive's bridge puts out nothing, the other does: its enable (PA10) and PWM (PA8), its \
          supply pins"
     };
-    Ok(check("drive bridge", false, format!("0 %{}", fault(slow)), advice))
+    Ok(row::DRIVE_BRIDGE.check(false, format!("0 %{}", fault(slow)), advice))
 }
 
 /// Change of the preload by a motion, N.
-fn preload_change(motion: &Motion, scale: &Scale) -> f64 {
-    let rows = &motion.rows;
-    let before = mean(rows.iter().take(15).map(|row| scale.preload(row))).0;
-    mean(rows.iter().rev().take(100).map(|row| scale.preload(row))).0 - before
+fn preload_change(motion: &Motion, rig: &Rig) -> Result<f64, BringupError> {
+    let (sensor, rows) = (SensorId::PreloadSensor, &motion.rows);
+    Ok(level(sensor, rig, rows.iter().rev().take(100))? - level(sensor, rig, rows.iter().take(15))?)
 }
 
 /// What the encoder, an eye and the other sensors make of the first motion of the drive.
@@ -133,7 +125,7 @@ fn turns(
     };
     let shown =
         table::counted(counts.sum, "count") + &format!(", seen to turn: {eye}{}", fault(motion));
-    if counts.sum > 20 {
+    if row::DRIVE_TURNS.has(counts.sum as f64) {
         let advice = match seen {
             Seen::Inwards => {
                 "both the encoder's lines and the drive motor's leads are swapped: swap A and B, \
@@ -146,8 +138,8 @@ fn turns(
             }
         };
         return vec![
-            check("drive turns", true, shown, ""),
-            check("drive direction", seen == Seen::Outwards, eye.to_owned(), advice),
+            row::DRIVE_TURNS.check(true, shown, ""),
+            row::DRIVE_DIRECTION.check(seen == Seen::Outwards, eye.to_owned(), advice),
         ];
     }
     let was_seen = matches!(seen, Seen::Outwards | Seen::Inwards);
@@ -155,7 +147,7 @@ fn turns(
         "the motors are exchanged: the drive's bridge moves the pre-tightener (preload \
          {preload_change:+.1} N)"
     );
-    let advice = if counts.sum < -20 {
+    let advice = if row::DRIVE_TURNS.has(-counts.sum as f64) {
         match seen {
             Seen::Outwards => "the encoder's lines A and B are swapped",
             Seen::Inwards => "the drive motor's leads are swapped",
@@ -181,5 +173,5 @@ fn turns(
         "the wheel is blocked, or the drive motor's leads are open: turn the motor by its crank; if \
          it is free, measure the motor's resistance at the bridge"
     };
-    vec![check("drive turns", false, shown, advice)]
+    vec![row::DRIVE_TURNS.check(false, shown, advice)]
 }

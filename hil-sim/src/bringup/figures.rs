@@ -2,53 +2,44 @@
 
 use interstage::log::Record;
 use interstage::rig::Rig;
-use interstage::sense::analog::{FULL_AT, ZERO_AT};
-use interstage::sense::raw::BridgeCode;
+use interstage::sense::raw::{BridgeCode, EncoderCount, SensorId};
 
-/// Codes between a sensor's zero and its full scale.
-const SPAN: f64 = (FULL_AT - ZERO_AT) * 65_535.0;
-/// Codes of an angle sensor's turn.
-pub(super) const TURN: f64 = 16_384.0;
+use super::BringupError;
+use super::line::silent;
+use crate::plant::sensors::{Coding, SPAN, TURN, decode, encode};
 
-/// Mean and standard deviation; zero of nothing.
-pub(super) fn mean(values: impl Iterator<Item = f64>) -> (f64, f64) {
+/// Mean and standard deviation; none of nothing.
+pub(super) fn mean(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
     let all: Vec<f64> = values.collect();
-    let count = all.len().max(1) as f64;
+    let count = all.len() as f64;
     let mean = all.iter().sum::<f64>() / count;
     let square = all.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / count;
-    (mean, square.sqrt())
+    (!all.is_empty()).then(|| (mean, square.sqrt()))
 }
 
-/// The sensors of a rig in its quantities.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Scale {
-    pub preload_n: f64,
-    pub compression_mm: f64,
-    pub count_mm: f64,
+/// What a sensor of this rig shows in a row, N or mm.
+pub(super) fn shown(sensor: SensorId, rig: &Rig, row: &Record) -> f64 {
+    decode(sensor, rig, row.codes[sensor as usize].into())
 }
 
-impl Scale {
-    pub(super) fn of(rig: &Rig) -> Self {
-        let around = std::f64::consts::TAU * rig.rig.wheel_radius_mm;
-        Self {
-            preload_n: rig.sense.preload_full_scale_n / SPAN,
-            compression_mm: rig.sense.tread_full_scale_mm / SPAN,
-            count_mm: around / rig.sense.encoder_counts,
-        }
-    }
-
-    pub(super) fn preload(&self, row: &Record) -> f64 {
-        (f64::from(row.codes[1]) - ZERO_AT * 65_535.0) * self.preload_n
-    }
-
-    pub(super) fn compression(&self, row: &Record) -> f64 {
-        (f64::from(row.codes[2]) - ZERO_AT * 65_535.0) * self.compression_mm
-    }
+/// Mean of what it shows in these rows, of which there must be one.
+pub(super) fn level<'a>(
+    sensor: SensorId,
+    rig: &Rig,
+    rows: impl Iterator<Item = &'a Record>,
+) -> Result<f64, BringupError> {
+    let mean = mean(rows.map(|row| shown(sensor, rig, row)));
+    mean.map(|(mean, _)| mean).ok_or_else(silent)
 }
 
-/// Part of the converter at which an analogue sensor reads.
-pub(super) fn part(code: u16) -> f64 {
-    f64::from(code) / 65_535.0
+/// Travel of the tread over these rows, mm.
+pub(super) fn travel_mm(rig: &Rig, rows: &[Record]) -> f64 {
+    decode(SensorId::WheelEncoder, rig, counted(rows).sum as f64)
+}
+
+/// Part of the converter at which a sensor reads in these rows.
+pub(super) fn part(sensor: SensorId, rows: &[Record]) -> Option<f64> {
+    Some(mean(rows.iter().map(|row| f64::from(row.codes[sensor as usize])))?.0 / SPAN)
 }
 
 /// Output of a bridge, parts of the supply.
@@ -56,15 +47,15 @@ pub(super) fn output(code: u16) -> f64 {
     f64::from(BridgeCode::new(code).duty()) / 32_768.0
 }
 
-/// Code of the angle without parity and flag.
-pub(super) fn angle(row: &Record) -> f64 {
-    f64::from(row.codes[3] & 0x3FFF)
+/// Code of the angle; none of an unsound frame.
+pub(super) fn angle(row: &Record) -> Option<f64> {
+    Coding::Angle.number(row.codes[SensorId::ArmAngle as usize])
 }
 
 /// Code of the arm with the wheel, uncompressed, on the outermost wall.
 pub fn stowed(rig: &Rig) -> f64 {
     let sine = (rig.centre_radius_mm(0) - rig.rig.arm_pivot_radius_mm) / rig.rig.arm_length_mm;
-    rig.sense.angle_zero_code + sine.asin() / std::f64::consts::TAU * TURN
+    encode(SensorId::ArmAngle, rig, sine.asin().to_degrees())
 }
 
 /// Difference of two codes of the angle, the short way round.
@@ -80,10 +71,14 @@ pub(super) struct Counted {
     pub changes: usize,
 }
 
+pub(super) const fn count(row: &Record) -> EncoderCount {
+    EncoderCount::new(row.codes[SensorId::WheelEncoder as usize])
+}
+
 pub(super) fn counted(rows: &[Record]) -> Counted {
     let (mut sum, mut low, mut high, mut changes) = (0_i64, 0, 0, 0);
     for pair in rows.windows(2) {
-        let step = pair[1].codes[0].wrapping_sub(pair[0].codes[0]) as i16;
+        let step = count(&pair[1]).since(count(&pair[0]));
         sum += i64::from(step);
         changes += usize::from(step != 0);
         (low, high) = (sum.min(low), sum.max(high));
@@ -100,11 +95,8 @@ mod tests {
         for (from, to, expected) in
             [(10.0, 20.0, 10.0), (16_380.0, 4.0, 8.0), (4.0, 16_380.0, -8.0), (0.0, 8000.0, 8000.0)]
         {
-            assert!(
-                (turned(from, to) - expected).abs() < 1e-9,
-                "{from} {to}: {}",
-                turned(from, to)
-            );
+            let short = turned(from, to);
+            assert!((short - expected).abs() < 1e-9, "{from} {to}: {short}");
         }
     }
 
@@ -112,7 +104,7 @@ mod tests {
     fn counts_go_on_across_the_wrap() {
         let mut rows = [Record::default(); 4];
         for (row, count) in rows.iter_mut().zip([65_530, 2, 1, 2]) {
-            row.codes[0] = count;
+            row.codes[SensorId::WheelEncoder as usize] = count;
         }
         assert_eq!(counted(&rows), Counted { sum: 8, range: 8, changes: 3 });
     }

@@ -4,7 +4,7 @@
 use std::error::Error;
 use std::path::Path;
 
-use super::{Check, GATES, Progress, Stage, check};
+use super::{Check, GATES, Progress, Stage, row};
 use crate::files::write_text;
 use crate::identify::result::BY;
 use crate::record::Summary;
@@ -16,9 +16,8 @@ pub(crate) const MINE: &str = "mine.toml";
 /// The folder, where none is named.
 pub(crate) const FOLDER: &str = "out/bringup";
 
-/// Fastest cruise of a first crossing, mm/s, and slip that no crossing has, mm.
+/// Fastest cruise of a first crossing, mm/s.
 const SLOW_MM_S: f64 = 5.0;
-const SLIP_MM: f64 = 0.5;
 
 /// Whether a log is that of a first crossing.
 pub(crate) fn crossed(run: &Summary, scenario: &Scenario) -> Check {
@@ -27,11 +26,12 @@ pub(crate) fn crossed(run: &Summary, scenario: &Scenario) -> Check {
     let slips = lines.iter().filter_map(|line| line.slip_measured_mm);
     let slip = slips.map(f64::abs).fold(0.0, f64::max);
     let arrives = run.completed && run.faults.is_empty() && lines.len() == steps;
-    let ok = arrives && cruise <= SLOW_MM_S && slip <= SLIP_MM;
+    let slips = (arrives && cruise <= SLOW_MM_S).then_some(slip);
     let fault = run.faults.first().map_or(String::new(), |fault| format!("; {}", fault.text));
     let of = lines.len();
     let measured = format!("{of} of {steps} steps, {cruise:.1} mm/s, slip {slip:.2} mm{fault}");
-    check("first crossing", ok, measured, "deploy at drive.cruise_speed_mm_s = 5 over every step")
+    let advice = "deploy at drive.cruise_speed_mm_s = 5 over every step";
+    row::FIRST_CROSSING.by(slips, measured, advice)
 }
 
 /// Whether complete logs have shown tread and friction.
@@ -41,13 +41,13 @@ pub(crate) fn identified(scenario: &Scenario, is_complete: bool) -> Check {
     let shown: Vec<&str> = wanted.into_iter().filter(by_logs).collect();
     let ok = is_complete && shown.len() == wanted.len();
     let advice = "give three complete logs, at 0.75, 1 and 1.25 times the cruise preload";
-    check("identified", ok, format!("shown: {}", shown.join(", ")), advice)
+    row::IDENTIFIED.check(ok, format!("shown: {}", shown.join(", ")), advice)
 }
 
 /// That a rig is what its parameters say, or the first reason why not.
 pub(crate) fn accepted(reasons: &[String]) -> Check {
     let measured = reasons.first().map_or("as its parameters say", String::as_str).to_owned();
-    check("accepted", reasons.is_empty(), measured, "`rig accept` names every reason")
+    row::ACCEPTED.check(reasons.is_empty(), measured, "`rig accept` names every reason")
 }
 
 /// Records a gate in this folder, with the parameters that it has found. The log's controller had

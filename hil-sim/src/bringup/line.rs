@@ -169,7 +169,7 @@ impl<'p> Line<'p> {
         let since = self.listener().now();
         while self.listener().down(CONSOLE, &[letter(command)])? == 0 {
             if self.listener().now().saturating_sub(since) > SILENCE {
-                return Err(StoreError::Silent { seconds: SILENCE.as_secs_f64() }.into());
+                return Err(silent());
             }
             self.listener().pass()?;
         }
@@ -194,7 +194,7 @@ impl<'p> Line<'p> {
             Some(Mode::Boot | Mode::SelfTest | Mode::Zero) => self.idle()?,
             mode => mode,
         };
-        mode.ok_or_else(|| StoreError::Silent { seconds: SILENCE.as_secs_f64() }.into())
+        mode.ok_or_else(silent)
     }
 
     /// What was heard in the present wait.
@@ -252,6 +252,11 @@ impl<'p> Line<'p> {
     ) -> Result<Motion, BringupError> {
         self.move_and(duties, milliseconds, rest_ms, |_| Ok(ControlFlow::Continue(())))
     }
+}
+
+/// The log has brought nothing.
+pub(super) fn silent() -> BringupError {
+    StoreError::Silent { seconds: SILENCE.as_secs_f64() }.into()
 }
 
 fn mode_of(rows: &[Record]) -> Option<Mode> {

@@ -1,11 +1,12 @@
 //! What a motion in the service mode shows of its bridge.
 
 use interstage::log::Record;
+use interstage::rig::Rig;
 use interstage::supervise::Mode;
 
-use super::figures::output;
+use super::figures::{output, travel_mm};
 use super::line::Motion;
-use super::{Check, check};
+use super::{Check, row};
 
 /// Changes that count as one: preload, N, and compression, mm. A tread that was rolled creeps by
 /// less for a second.
@@ -20,6 +21,13 @@ pub(super) fn driven(motion: &Motion, bridge: usize) -> &[Record] {
     let first = motion.rows.iter().position(given).unwrap_or(0);
     let last = motion.rows.iter().rposition(given).map_or(first, |last| last + 1);
     &motion.rows[first..last]
+}
+
+/// Speed of the tread in the later half of a motion of the drive, mm/s.
+pub(super) fn speed(motion: &Motion, rig: &Rig) -> f64 {
+    let rows = driven(motion, 0);
+    let steady = &rows[rows.len() / 2..];
+    travel_mm(rig, steady) / (1e-3 * steady.len().saturating_sub(1).max(1) as f64)
 }
 
 /// The fault that ended a motion, in words.
@@ -41,7 +49,7 @@ pub(super) fn bridge(motion: &Motion, which: usize, duty: f64) -> (Check, bool) 
         outputs.fold(0.0, |most: f64, now| if now.abs() > most.abs() { now } else { most })
     };
     let (own, other) = (largest(which), largest(1 - which));
-    let name = ["drive bridge", "pre-tightener bridge"][which];
+    let row = &[row::DRIVE_BRIDGE, row::PRETIGHTENER_BRIDGE][which];
     let (motor, pin) = [("drive", "PB0"), ("pre-tightener", "PB1")][which];
     let silent = own.abs() < 0.3 * duty && other.abs() < 0.3 * duty;
     let advice = if other > 0.5 * duty && own.abs() < 0.5 * duty {
@@ -62,5 +70,5 @@ pub(super) fn bridge(motion: &Motion, which: usize, duty: f64) -> (Check, bool) 
     let other_fault = matches!(motion.mode, Mode::FaultHold(f) if !matches!(f.code(), 128 | 129));
     let shown = format!("{:.0} %, the other {:.0} %{}", 100.0 * own, 100.0 * other, fault(motion));
     let sound = good || other_fault && (own - duty).abs() < 0.05;
-    (check(name, sound, shown, &advice), silent && !rows.is_empty())
+    (row.check(sound, shown, &advice), silent && !rows.is_empty())
 }

@@ -6,15 +6,18 @@
 use std::ops::ControlFlow;
 
 use interstage::log::Record;
+use interstage::rig::Rig;
+use interstage::sense::raw::SensorId;
 use interstage::supervise::service::MOTION_TICKS;
 use interstage::supervise::{Command, Mode, ServiceDuties};
 use interstage::units::Direction;
 use serde::Serialize;
 
-use super::figures::{Scale, counted, mean};
+use super::figures::{count, level, travel_mm};
 use super::line::{Line, drive, press};
 use super::motion::CHANGED;
 use super::{BringupError, Operator};
+use crate::plant::sensors::decode;
 
 /// Farthest jog, mm.
 pub const FARTHEST_MM: f64 = 200.0;
@@ -97,7 +100,7 @@ pub fn operate(
     operation: Operation,
     stopped: &dyn Fn() -> bool,
 ) -> Result<Operated, BringupError> {
-    let scale = Scale::of(&line.held()?.rig);
+    let rig = &line.held()?.rig;
     let mode = line.started()?;
     match mode {
         _ if operation == Operation::Zero && mode.is_at_rest() => {}
@@ -114,7 +117,7 @@ pub fn operate(
             return Err(BringupError::Declined(motion));
         }
     }
-    let mut doing = Doing { line, scale, stopped, rows: Vec::new() };
+    let mut doing = Doing { line, rig, stopped, rows: Vec::new() };
     let ended = match operation {
         Operation::Jog(mm) => doing.jog(mm),
         Operation::Home => doing.home(mode),
@@ -125,12 +128,12 @@ pub fn operate(
         doing.line.leave();
     }
     let (done, note) = ended?;
-    let (preload_n, compression_mm) = doing.level();
+    let (preload_n, compression_mm) = doing.level()?;
     Ok(Operated {
         done,
         note: if stopped() { "stopped by the operator".to_owned() } else { note },
         mode: words(doing.mode()),
-        travel_mm: counted(&doing.rows).sum as f64 * scale.count_mm,
+        travel_mm: travel_mm(rig, &doing.rows),
         preload_n,
         compression_mm,
     })
@@ -147,7 +150,7 @@ fn words(mode: Mode) -> String {
 /// An operation under way.
 struct Doing<'a, 'p> {
     line: &'a mut Line<'p>,
-    scale: Scale,
+    rig: &'a Rig,
     stopped: &'a dyn Fn() -> bool,
     /// All that was heard.
     rows: Vec<Record>,
@@ -162,10 +165,9 @@ impl Doing<'_, '_> {
     }
 
     /// Preload, N, and compression, mm, of the last tenth of a second.
-    fn level(&self) -> (f64, f64) {
-        let last = || self.rows.iter().rev().take(100);
-        let preload = mean(last().map(|row| self.scale.preload(row))).0;
-        (preload, mean(last().map(|row| self.scale.compression(row))).0)
+    fn level(&self) -> Result<(f64, f64), BringupError> {
+        let of = |sensor| level(sensor, self.rig, self.rows.iter().rev().take(100));
+        Ok((of(SensorId::PreloadSensor)?, of(SensorId::CompressionSensor)?))
     }
 
     /// A motion of the service mode, until `is_over` says so of its travel, mm, or the operator
@@ -176,17 +178,17 @@ impl Doing<'_, '_> {
         milliseconds: u32,
         is_over: impl Fn(f64) -> bool,
     ) -> Result<Option<f64>, BringupError> {
-        let (stopped, count_mm) = (self.stopped, self.scale.count_mm);
+        let (stopped, rig) = (self.stopped, self.rig);
         let mut start = None;
         let motion = self.line.move_and(duties, milliseconds, REST_MS, |line| {
-            let Some(count) = line.heard().last().map(|row| row.codes[0]) else {
+            let Some(count) = line.heard().last().map(count) else {
                 return Ok(ControlFlow::Continue(()));
             };
-            let counts = count.wrapping_sub(*start.get_or_insert(count)) as i16;
-            let is_over = stopped() || is_over(f64::from(counts) * count_mm);
+            let counts = count.since(*start.get_or_insert(count));
+            let is_over = stopped() || is_over(decode(SensorId::WheelEncoder, rig, counts.into()));
             Ok(if is_over { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
         })?;
-        let travel_mm = counted(&motion.rows).sum as f64 * count_mm;
+        let travel_mm = travel_mm(rig, &motion.rows);
         self.rows.extend(motion.rows);
         Ok((self.mode() == Mode::Service).then_some(travel_mm))
     }
@@ -257,13 +259,13 @@ impl Doing<'_, '_> {
 
     fn release(&mut self) -> Ended {
         self.reset()?;
-        let mut entry = self.level().0;
+        let mut entry = self.level()?.0;
         for _ in 0..MOTIONS {
-            let before = self.level().0;
+            let before = self.level()?.0;
             if self.motion(press(RELEASE), RELEASE_MS, |_| false)?.is_none() {
                 return Ok((false, words(self.mode())));
             }
-            let now = self.level().0;
+            let now = self.level()?.0;
             if now - before > CHANGED.0 {
                 let note =
                     "the preload rises: the pre-tightener's leads are swapped, or the sensor's";

@@ -3,22 +3,12 @@
 use std::fmt;
 use std::io::{BufRead, Write};
 
+use interstage::sense::raw::SensorId;
+
 use super::BringupError;
 
-/// A sensor with a plug.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Sensor {
-    Preload,
-    Compression,
-}
-
-impl fmt::Display for Sensor {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Preload => "preload sensor",
-            Self::Compression => "compression sensor",
-        })
-    }
+pub(super) const fn name(sensor: SensorId) -> &'static str {
+    SensorId::NAMES[sensor as usize]
 }
 
 /// What a hand is asked to do.
@@ -29,9 +19,9 @@ pub enum Action {
     /// Press the emergency stop and hold it.
     PressStop,
     ReleaseStop,
-    Unplug(Sensor),
+    Unplug(SensorId),
     /// Plug it in again.
-    Plug(Sensor),
+    Plug(SensorId),
     /// Rest the carriage on its stop and hold the wheel off the wall by a block.
     Block,
     /// Take the block out: the wheel touches the wall.
@@ -39,7 +29,7 @@ pub enum Action {
     /// Rest the carriage on its stop and lift the wheel off the wall.
     LiftOff,
     /// Take off the weight or the gauge.
-    TakeOff(Sensor),
+    TakeOff(SensorId),
     /// Hold the board's reset button for two seconds.
     HoldReset,
 }
@@ -52,8 +42,8 @@ impl fmt::Display for Action {
             ),
             Self::PressStop => f.write_str("Press the emergency stop and leave it pressed."),
             Self::ReleaseStop => f.write_str("Release the emergency stop."),
-            Self::Unplug(sensor) => write!(f, "Unplug the {sensor}."),
-            Self::Plug(sensor) => write!(f, "Plug the {sensor} in again."),
+            Self::Unplug(sensor) => write!(f, "Unplug the {}.", name(*sensor)),
+            Self::Plug(sensor) => write!(f, "Plug the {} in again.", name(*sensor)),
             Self::Block => f.write_str(
                 "Carriage on its stop: hold the arm off by a block, the wheel clear of the wall.",
             ),
@@ -63,7 +53,7 @@ impl fmt::Display for Action {
             Self::LiftOff => f.write_str(
                 "Carriage on its stop: turn the screw back by hand until the wheel is clear of the wall.",
             ),
-            Self::TakeOff(sensor) => write!(f, "Take that off the {sensor} again."),
+            Self::TakeOff(sensor) => write!(f, "Take that off the {} again.", name(*sensor)),
             Self::HoldReset => f.write_str("Hold the board's reset button for 2 s."),
         }
     }
@@ -132,7 +122,7 @@ pub trait Operator {
 
     /// Puts the first or second weight, N, or gauge, mm, at a sensor; returns what is written on
     /// it.
-    fn put(&mut self, sensor: Sensor, is_second: bool) -> Result<f64, BringupError>;
+    fn put(&mut self, sensor: SensorId, is_second: bool) -> Result<f64, BringupError>;
 }
 
 /// A person at the terminal, or the lines of a script.
@@ -187,11 +177,13 @@ impl<R: BufRead, W: Write> Operator for Stdin<R, W> {
         Ok(seen.map_or(Seen::Unknown, |(_, seen)| *seen))
     }
 
-    fn put(&mut self, sensor: Sensor, is_second: bool) -> Result<f64, BringupError> {
+    fn put(&mut self, sensor: SensorId, is_second: bool) -> Result<f64, BringupError> {
         let which = if is_second { "second, twice the first or more" } else { "first" };
         let prompt = match sensor {
-            Sensor::Preload => "Hang a weight on the wheel, which pulls as the wall presses. Its N",
-            Sensor::Compression => "Put a gauge under the compression sensor. Its mm",
+            SensorId::PreloadSensor => {
+                "Hang a weight on the wheel, which pulls as the wall presses. Its N"
+            }
+            _ => "Put a gauge under the compression sensor. Its mm",
         };
         loop {
             let answer = self.ask(&format!("{prompt} (the {which})?"))?.replace(',', ".");
@@ -213,7 +205,7 @@ mod tests {
         assert!(script.act(Action::PressStop).is_ok());
         assert_eq!(script.look(Question::Turned).unwrap(), Seen::Outwards);
         assert_eq!(script.look(Question::Supplied).unwrap(), Seen::Nothing);
-        assert_eq!(script.put(Sensor::Preload, false).unwrap(), 19.6);
+        assert_eq!(script.put(SensorId::PreloadSensor, false).unwrap(), 19.6);
         assert!(matches!(script.confirm("Again."), Err(BringupError::Declined(_))));
         assert!(matches!(script.confirm("Again."), Err(BringupError::Declined(_))));
         assert!(matches!(script.act(Action::ReleaseStop), Err(BringupError::NoAnswer(_))));

@@ -1,18 +1,18 @@
 //! The pre-tightener's motor in the service mode: its bridge, direction, sensors, scale.
 
 use interstage::log::Record;
+use interstage::rig::Rig;
+use interstage::sense::raw::SensorId;
 use interstage::supervise::Mode;
 
-use super::figures::{Scale, angle, counted, mean, turned};
-use super::line::{Motion, press};
+use super::figures::{angle, counted, level, mean, turned};
+use super::line::{Motion, press, silent};
 use super::motion::{CHANGED, bridge, driven, fault};
-use super::{Action, BringupError, Check, Session, check};
+use super::{Action, BringupError, Check, Session, row};
 
 /// Duty of the pre-tightener, and the steps of preload, ms.
 const PRESS: f64 = 0.25;
 const STEPS_MS: [u32; 3] = [550, 850, 550];
-/// Factor by which the rate may differ: screw, spring or the preload sensor's scale.
-const RATE: f64 = 2.0;
 /// Rest behind a step, ms; the tread's memory is a tenth of a second. Its second half is judged.
 pub(super) const REST_MS: u32 = 500;
 
@@ -25,14 +25,16 @@ pub(super) struct Level {
 }
 
 impl Level {
-    pub(super) fn of(rows: &[Record], scale: &Scale) -> Self {
+    /// Of the last of these rows.
+    pub(super) fn of(rows: &[Record], rig: &Rig) -> Result<Self, BringupError> {
         let last = || rows.iter().rev().take(REST_MS as usize / 2);
-        let first = last().next().map_or(0.0, angle);
-        Self {
-            preload: mean(last().map(|row| scale.preload(row))).0,
-            compression: mean(last().map(|row| scale.compression(row))).0,
-            angle: first + mean(last().map(|row| turned(first, angle(row)))).0,
-        }
+        let first = last().find_map(angle).ok_or_else(silent)?;
+        let angles = mean(last().filter_map(angle).map(|angle| turned(first, angle)));
+        Ok(Self {
+            preload: level(SensorId::PreloadSensor, rig, last())?,
+            compression: level(SensorId::CompressionSensor, rig, last())?,
+            angle: first + angles.ok_or_else(silent)?.0,
+        })
     }
 
     pub(super) fn since(self, before: Self) -> Self {
@@ -61,33 +63,33 @@ pub(super) fn pretightener(session: &mut Session<'_, '_>) -> Result<Vec<Check>, 
     // The emergency stop was pressed meanwhile; the bounds and zeros are those of this rest.
     session.line.reset()?;
     session.operator.confirm("The PRE-TIGHTENER presses the wheel, 25 % for 0.55 s.")?;
-    let scale = Scale::of(&session.expected.rig);
-    let base = Level::of(&session.line.listen(REST_MS)?, &scale);
+    let rig = &session.expected.rig;
+    let base = Level::of(&session.line.listen(REST_MS)?, rig)?;
     let first = session.line.moved(press(PRESS), STEPS_MS[0], REST_MS)?;
     let mut checks = vec![bridge(&first, 1, PRESS).0];
     if !checks[0].ok {
         return Ok(checks);
     }
-    let change = Level::of(&first.rows, &scale).since(base);
+    let change = Level::of(&first.rows, rig)?.since(base);
     (session.say)(&format!("  {}", change.text()));
-    checks.push(rises(session, &first, change, base, &scale)?);
+    checks.push(rises(session, &first, change, base)?);
     if checks.iter().any(|check| !check.ok) {
-        release(session, base, &scale, STEPS_MS[0])?;
+        release(session, base, STEPS_MS[0])?;
         return Ok(checks);
     }
     session.operator.confirm("The PRE-TIGHTENER presses on, to about 12 N.")?;
     let mut levels = vec![(driven(&first, 1).len() as f64 * 1e-3, change)];
     for milliseconds in &STEPS_MS[1..] {
         let motion = session.line.moved(press(PRESS), *milliseconds, REST_MS)?;
-        let level = Level::of(&motion.rows, &scale).since(base);
+        let level = Level::of(&motion.rows, rig)?.since(base);
         (session.say)(&format!("  {}", level.text()));
         levels.push((driven(&motion, 1).len() as f64 * 1e-3, level));
     }
     checks.extend(judge(session, &levels));
-    let (left, mode) = release(session, base, &scale, STEPS_MS.iter().sum())?;
-    let (measured, good) = (left.text(), left.preload < 2.0 && mode == Some(Mode::Idle));
+    let (left, mode) = release(session, base, STEPS_MS.iter().sum())?;
+    let released = (mode == Some(Mode::Idle)).then_some(left.preload);
     let advice = "the preload does not come off: turn the pre-tightener back by hand";
-    checks.push(check("preload released", good, measured, advice));
+    checks.push(row::PRELOAD_RELEASED.by(released, left.text(), advice));
     Ok(checks)
 }
 
@@ -97,7 +99,6 @@ fn rises(
     first: &Motion,
     change: Level,
     base: Level,
-    scale: &Scale,
 ) -> Result<Check, BringupError> {
     let up = |value: f64, least: f64| if value.abs() < least { 0.0 } else { value.signum() };
     let preload = up(change.preload, CHANGED.0);
@@ -105,7 +106,7 @@ fn rises(
     let shown = change.text() + &fault(first);
     let advice = match (preload as i32, compression as i32) {
         (1, 1) if first.mode == Mode::Service => {
-            return Ok(check("preload rises", true, shown, ""));
+            return Ok(row::PRELOAD_RISES.check(true, shown, ""));
         }
         (1, 1) => "the motion ended in a fault",
         (-1, 1) => "the preload sensor's bridge is reversed: swap its two signal leads",
@@ -128,7 +129,7 @@ fn rises(
         _ => {
             session.operator.confirm("Nothing moved: the PRE-TIGHTENER turns back for 1.2 s.")?;
             let back = session.line.moved(press(-PRESS), 1200, REST_MS)?;
-            let change = Level::of(&back.rows, scale).since(base);
+            let change = Level::of(&back.rows, &session.expected.rig)?.since(base);
             let swapped = format!(
                 "the pre-tightener's leads are swapped: backwards it presses ({})",
                 change.text()
@@ -139,10 +140,10 @@ fn rises(
             } else {
                 &swapped
             };
-            return Ok(check("preload rises", false, shown, advice));
+            return Ok(row::PRELOAD_RISES.check(false, shown, advice));
         }
     };
-    Ok(check("preload rises", false, shown, advice))
+    Ok(row::PRELOAD_RISES.check(false, shown, advice))
 }
 
 /// The three steps together: each time of duty, s, and the level it led to.
@@ -157,7 +158,7 @@ fn judge(session: &mut Session<'_, '_>, levels: &[(f64, Level)]) -> Vec<Check> {
         "the arm's code does not follow the tread's compression: the magnet turns with the arm, \
          and the sensor does not?"
     };
-    let mut checks = vec![check("arm direction", last.angle > 1.0, last.text(), advice)];
+    let mut checks = vec![row::ARM_DIRECTION.by(Some(last.angle), last.text(), advice)];
     // Two durations give rate and dead time, P = slew u (T - D); the outer steps are alike.
     let (short, long) =
         (last.preload - second.preload + first.preload, second.preload - first.preload);
@@ -166,8 +167,7 @@ fn judge(session: &mut Session<'_, '_>, levels: &[(f64, Level)]) -> Vec<Check> {
     let dead_s = t_short - short / (PRESS * slew);
     let by_spring = slew / rig.preload.slew_n_per_s;
     let rounded = (slew * 10.0).round() / 10.0;
-    let near = (1.0 / RATE..=RATE).contains(&by_spring);
-    if near {
+    if row::PRELOAD_RATE.has(by_spring) {
         session.proposed.rig.preload.slew_n_per_s = rounded;
         // The outer steps differ by what does not repeat.
         let repeats = (last.preload - second.preload - first.preload).abs();
@@ -181,7 +181,7 @@ fn judge(session: &mut Session<'_, '_>, levels: &[(f64, Level)]) -> Vec<Check> {
         "the pre-tightener is of another speed or spring, or the preload sensor of another scale: \
          press it by a known force. If it shows that, set preload.slew_n_per_s = {rounded}"
     );
-    checks.push(check("preload rate", near, shown, &advice));
+    checks.push(row::PRELOAD_RATE.by(Some(by_spring), shown, &advice));
     checks
 }
 
@@ -189,7 +189,6 @@ fn judge(session: &mut Session<'_, '_>, levels: &[(f64, Level)]) -> Vec<Check> {
 pub(super) fn release(
     session: &mut Session<'_, '_>,
     base: Level,
-    scale: &Scale,
     raised_ms: u32,
 ) -> Result<(Level, Option<Mode>), BringupError> {
     if session.line.mode()? != Some(Mode::Service) && session.line.reset()? != Some(Mode::Idle) {
@@ -200,7 +199,7 @@ pub(super) fn release(
     // As long as it was raised, and some more: dead times add up.
     while spent < raised_ms + 1500 {
         let motion = session.line.moved(press(-PRESS), 400, REST_MS)?;
-        left = Level::of(&motion.rows, scale).since(base);
+        left = Level::of(&motion.rows, &session.expected.rig)?.since(base);
         spent += 400;
         // Once more: the sensor shows less than this of what presses.
         if is_slack || motion.mode != Mode::Service {

@@ -4,11 +4,14 @@
 
 use std::ops::ControlFlow;
 
-use super::figures::{Scale, counted, mean};
+use interstage::sense::raw::SensorId;
+
+use super::figures::level;
 use super::line::{drive, press};
-use super::motion::{driven, fault};
+use super::motion::{fault, speed};
 use super::pretightener::{Level, REST_MS, release};
-use super::{BringupError, Check, Session, check};
+use super::{BringupError, Check, Session, row};
+use crate::plant::sensors::decode;
 
 /// Duties inwards: of a free wheel both, of the pull the second.
 const SLOW: f64 = 0.15;
@@ -19,33 +22,25 @@ const PULL_MS: u32 = 1000;
 const PRESS: f64 = 0.40;
 const PRESS_MS: u32 = 2400;
 const PRESSED_N: f64 = 12.0;
-/// Parts of the free speed between which it slips.
-const SLIPS: (f64, f64) = (0.1, 0.97);
-/// Frictions of rubber on metal, from wet to clean.
-const FRICTIONS: (f64, f64) = (0.3, 1.6);
 /// How well the stall force at this supply is known, and the preload.
 const KNOWN: f64 = 0.05 + 0.01;
 
 /// The pull, and the preload off again.
 pub(super) fn run(session: &mut Session<'_, '_>) -> Result<Vec<Check>, BringupError> {
     let rig = session.proposed.rig.clone();
-    let (scale, stall) = (Scale::of(&rig), rig.drive.stall_force_n);
+    let (rig, stall) = (&rig, rig.drive.stall_force_n);
     session.operator.confirm(
         "Carriage on its stop at the stow end, preload off: the DRIVE turns the wheel inwards, 15 % \
          and 30 % for 1 s.",
     )?;
     // The emergency stop was pressed for what hands did before.
     session.line.reset()?;
-    let base = Level::of(&session.line.listen(REST_MS)?, &scale);
+    let base = Level::of(&session.line.listen(REST_MS)?, rig)?;
     // Speed of the tread inwards, mm/s; rows after it; and the fault that ended it.
     let pull = |session: &mut Session<'_, '_>, duty: f64| -> Result<_, BringupError> {
         let motion = session.line.moved(drive(-duty), PULL_MS, REST_MS)?;
-        let rows = driven(&motion, 0);
-        let steady = &rows[rows.len() / 2..];
-        let seconds = steady.len().saturating_sub(1).max(1) as f64 * 1e-3;
-        let speed = -counted(steady).sum as f64 * scale.count_mm / seconds;
-        let after = Level::of(&motion.rows, &scale).since(base).preload;
-        Ok((speed, after, fault(&motion)))
+        let after = Level::of(&motion.rows, rig)?.since(base).preload;
+        Ok((-speed(&motion, rig), after, fault(&motion)))
     };
     let (slow, free) = (pull(session, SLOW)?.0, pull(session, FAST)?.0);
     let no_load = (free - slow) / (FAST - SLOW);
@@ -55,22 +50,21 @@ pub(super) fn run(session: &mut Session<'_, '_>) -> Result<Vec<Check>, BringupEr
     ))?;
     let motion = session.line.move_and(press(PRESS), PRESS_MS, REST_MS, |line| {
         let last = line.heard().iter().rev().take(20);
-        let is_pressed = mean(last.map(|row| scale.preload(row))).0 >= PRESSED_N;
+        let is_pressed = level(SensorId::PreloadSensor, rig, last).is_ok_and(|n| n >= PRESSED_N);
         Ok(if is_pressed { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
     })?;
-    let preload = Level::of(&motion.rows, &scale).since(base).preload;
+    let preload = Level::of(&motion.rows, rig)?.since(base).preload;
     // The first pull takes up what room the stop has.
     pull(session, FAST)?;
     let arm = (rig.centre_radius_mm(0) - rig.rig.arm_pivot_radius_mm) / rig.rig.arm_length_mm;
     let thrust = rig.plant.arm_coupling * arm / (1.0 - arm * arm).sqrt();
     let (first, ..) = pull(session, FAST)?;
     let (second, after, fault) = pull(session, FAST)?;
-    let (left, _) = release(session, base, &scale, 2 * PRESS_MS)?;
+    let (left, _) = release(session, base, 2 * PRESS_MS)?;
     let part = 0.5 * (first + second) / free;
     let pressed = preload >= 0.8 * PRESSED_N;
-    let mut checks = vec![check(
-        "pull slips",
-        pressed && (SLIPS.0..SLIPS.1).contains(&part) && fault.is_empty(),
+    let mut checks = vec![row::PULL_SLIPS.by(
+        (pressed && fault.is_empty()).then_some(part),
         format!("{:.0} % of its free speed at {preload:.1} N{fault}", 100.0 * part),
         "near its free speed the wheel rolls: the carriage is not on its stop at the stow end, or \
          the wheel not on the wall. Near rest 30 % is too little, or something holds the drive",
@@ -83,17 +77,17 @@ pub(super) fn run(session: &mut Session<'_, '_>) -> Result<Vec<Check>, BringupEr
     // The stop takes the drive's force, and so the arm takes preload off the wheel.
     let mu = lacks * stall / (preload_n - thrust * lacks * stall);
     // A count at either end of what is judged, and what does not repeat.
-    let speed = (first - second).abs() + scale.count_mm / (0.5e-3 * f64::from(PULL_MS));
+    let speed = (first - second).abs()
+        + decode(SensorId::WheelEncoder, rig, 1.0) / (0.5e-3 * f64::from(PULL_MS));
     let unsure = KNOWN + speed / (no_load * lacks) + (preload - after).abs() / preload_n;
     let within = mu * (1.0 + thrust * mu).abs() * unsure;
-    let sound = (FRICTIONS.0..FRICTIONS.1).contains(&mu) && left.preload < 2.0;
-    if sound {
+    let found = row::PRELOAD_RELEASED.has(left.preload).then_some(mu);
+    if found.is_some_and(|mu| row::FRICTION.has(mu)) {
         session.proposed.rig.plant.mu = (mu * 100.0).round() / 100.0;
         session.measured("plant.mu", mu, within, "a pull");
     }
-    checks.push(check(
-        "friction",
-        sound,
+    checks.push(row::FRICTION.by(
+        found,
         format!("{mu:.2}, {within:.2} either way: {:.2} N at {preload_n:.2} N", lacks * stall),
         "the tread is wet or worn, drive.stall_force_n or the arm is another than stated, or the \
          preload did not come off",

@@ -2,22 +2,22 @@
 //! reads, and its full scale. No motor moves.
 
 use interstage::rig::Rig;
+use interstage::sense::raw::SensorId;
 
-use super::figures::Scale;
+use super::operator::name;
 use super::pretightener::Level;
-use super::{Action, BringupError, Check, Sensor, Session, check};
+use super::{Action, BringupError, Check, Row, Session, row};
 
 /// Rows of a level.
 const CALM_ROWS: u32 = 800;
-/// Part by which the two may disagree, and by which the full scale may be off.
-const DISAGREE: f64 = 0.02;
-const OFF: f64 = 0.05;
 /// Ratio of the two below which they prove nothing of each other.
 const APART: f64 = 2.0;
 
 /// What is put at a sensor.
 pub(super) struct Reference {
-    sensor: Sensor,
+    sensor: SensorId,
+    /// Its direction, agreement and scale.
+    rows: [Row; 3],
     what: &'static str,
     unit: &'static str,
     key: &'static str,
@@ -28,7 +28,8 @@ pub(super) struct Reference {
 
 /// A weight by a kitchen's scales; a gauge with dirt under it.
 pub(super) const WEIGHT: Reference = Reference {
-    sensor: Sensor::Preload,
+    sensor: SensorId::PreloadSensor,
+    rows: [row::WEIGHT_DIRECTION, row::WEIGHTS_AGREE, row::WEIGHT_SCALE],
     what: "weight",
     unit: "N",
     key: "sense.preload_full_scale_n",
@@ -36,7 +37,8 @@ pub(super) const WEIGHT: Reference = Reference {
     full_scale: |rig| &mut rig.sense.preload_full_scale_n,
 };
 pub(super) const GAUGE: Reference = Reference {
-    sensor: Sensor::Compression,
+    sensor: SensorId::CompressionSensor,
+    rows: [row::GAUGE_DIRECTION, row::GAUGES_AGREE, row::GAUGE_SCALE],
     what: "gauge",
     unit: "mm",
     key: "sense.tread_full_scale_mm",
@@ -71,8 +73,8 @@ pub(super) fn run(
 /// What the sensor shows, once a hand's motion has died away.
 fn level(session: &mut Session<'_, '_>, of: &Reference) -> Result<f64, BringupError> {
     let rows = session.line.listen(CALM_ROWS)?;
-    let Level { preload, compression, .. } = Level::of(&rows, &Scale::of(&session.proposed.rig));
-    Ok(if of.sensor == Sensor::Preload { preload } else { compression })
+    let Level { preload, compression, .. } = Level::of(&rows, &session.proposed.rig)?;
+    Ok(if of.sensor == SensorId::PreloadSensor { preload } else { compression })
 }
 
 /// The checks, and the full scale with half its interval if all have passed.
@@ -82,7 +84,8 @@ fn judge(
     left: f64,
     full_scale: f64,
 ) -> (Vec<Check>, Option<(f64, f64)>) {
-    let Reference { sensor, what, unit, key, known, .. } = of;
+    let Reference { rows: [direction, agree, scale], what, unit, key, known, .. } = of;
+    let sensor = name(of.sensor);
     let [first, second] = points.map(|(is, read)| read / is);
     let (far, apart) = (points[1].0, points[1].0 / points[0].0);
     let (least, off) = (first.min(second), first / second - 1.0);
@@ -92,7 +95,7 @@ fn judge(
         format!("the {sensor} does not show the {what}: where it is mounted, its amplifier")
     };
     let shown = points.map(|(is, read)| format!("{is} {unit}: {read:+.3} {unit}")).join(", ");
-    let mut checks = vec![check(&format!("{what} direction"), least > 0.1, shown, &advice)];
+    let mut checks = vec![direction.by(Some(least), shown, &advice)];
     let advice = if apart < APART {
         format!("take a second {what} of twice the first or more")
     } else {
@@ -101,22 +104,21 @@ fn judge(
              what was typed. Repeat with others"
         )
     };
-    let agree = off.abs() <= DISAGREE && left <= DISAGREE * far && apart >= APART;
+    let differ = (apart >= APART).then(|| off.abs().max(left / far));
     let shown = format!("{:+.1} % apart, {left:.3} {unit} left when taken off", 100.0 * off);
     if checks[0].ok {
-        checks.push(check(&format!("{what}s agree"), agree, shown, &advice));
+        checks.push(agree.by(differ, shown, &advice));
     }
     // The larger one is known best; the other says how far it holds.
     let value = (1e3 * full_scale / second).round() * 1e-3;
     let within = value * (known.0 + (known.1 + left) / far + 0.5 * off.abs());
-    let near = (second - 1.0).abs() <= OFF;
     let shown = format!("{value:.3} {unit}, {within:.3} {unit} either way");
     let advice = format!(
         "the {sensor}'s scale is wrong by {second:.2}: its amplifier's gain, or its data sheet's. \
          Set {key} = {value:.2}, write it to the board and begin again"
     );
     if checks.iter().all(|check| check.ok) {
-        checks.push(check(&format!("{what} scale"), near, shown, &advice));
+        checks.push(scale.by(Some(second), shown, &advice));
     }
     let found = checks.iter().all(|check| check.ok).then_some((value, within));
     (checks, found)
@@ -125,6 +127,12 @@ fn judge(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::bringup::tests::on_a_silent_log;
+
+    #[test]
+    fn a_silent_log_shows_no_level() {
+        assert!(on_a_silent_log(|session| level(session, &WEIGHT)).is_err());
+    }
 
     #[test]
     fn the_full_scale_has_an_interval_and_what_is_wrong_is_named() {

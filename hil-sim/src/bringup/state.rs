@@ -93,7 +93,7 @@ impl Progress {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bringup::check;
+    use crate::bringup::row;
 
     #[test]
     fn progress_goes_on_for_the_same_rig_alone() {
@@ -101,8 +101,8 @@ mod tests {
         let path = folder.path().join("bringup.json");
         let mut progress = Progress::new(Scenario::default());
         progress.proposed.rig.drive.no_load_speed_mm_s = 58.7;
-        progress.add(Stage::Board, vec![check("firmware", true, "500 ticks".to_owned(), "")]);
-        progress.add(Stage::Sensors, vec![check("self-test", false, "boot".to_owned(), "wait")]);
+        progress.add(Stage::Board, vec![row::FIRMWARE.check(true, "500 ticks".to_owned(), "")]);
+        progress.add(Stage::Sensors, vec![row::SELF_TEST.check(false, "boot".to_owned(), "wait")]);
         progress.write(&path).unwrap();
         let back = Progress::read(&path, &Scenario::default()).expect("the same rig");
         assert_eq!(back, progress);

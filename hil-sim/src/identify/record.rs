@@ -6,21 +6,18 @@
 use std::f64::consts::TAU;
 use std::path::Path;
 
-use interstage::sense::angle;
-use interstage::sense::raw::{AngleFrame, EncoderCount, SensorFrame, SensorId};
+use interstage::rig::Rig;
+use interstage::sense::raw::{EncoderCount, SensorFrame, SensorId};
 use interstage::supervise::Mode;
 
 use super::IdentifyError;
 use crate::plant::rig::Drives;
+use crate::plant::sensors::{Coding, decode};
 use crate::record::{Columns, Run};
 use crate::scenario::{Direction, Scenario};
 
 /// Longest gap in a log that is bridged by the last reading, ticks.
 const LONGEST_GAP: u32 = 20;
-
-/// Part of the converter at which a bridge reads zero, and from there to full scale.
-const BRIDGE: (f64, f64) = (0.05, 0.85);
-const CONVERTER: f64 = 65_535.0;
 
 /// One tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -137,9 +134,7 @@ impl Record {
 /// Makes samples of raw codes, tick after tick.
 #[derive(Clone, Debug)]
 pub struct Reader {
-    preload_sensor_n: f64,
-    tread_mm: f64,
-    angle_zero_code: f64,
+    rig: Rig,
     wheel: Option<EncoderCount>,
     counts: i64,
     angle_at: Option<u32>,
@@ -148,15 +143,7 @@ pub struct Reader {
 impl Reader {
     /// For the sensors of this scenario's rig.
     pub fn new(scenario: &Scenario) -> Self {
-        let sense = &scenario.rig.sense;
-        Self {
-            preload_sensor_n: sense.preload_full_scale_n,
-            tread_mm: sense.tread_full_scale_mm,
-            angle_zero_code: sense.angle_zero_code,
-            wheel: None,
-            counts: 0,
-            angle_at: None,
-        }
+        Self { rig: scenario.rig.clone(), wheel: None, counts: 0, angle_at: None }
     }
 
     /// The sample of a tick: what the sensors said before it, and its duties.
@@ -166,21 +153,21 @@ impl Reader {
             self.counts += i64::from(since);
             self.wheel = Some(wheel.code);
         }
-        let bridge = |sensor: SensorId| {
-            frame[sensor].map_or(0.0, |s| (f64::from(s.code) / CONVERTER - BRIDGE.0) / BRIDGE.1)
+        let shown = |sensor: SensorId| {
+            frame[sensor].map_or(0.0, |s| decode(sensor, &self.rig, s.code.into()))
         };
-        let arm = frame.get(SensorId::ArmAngle, AngleFrame::new);
+        let arm = frame[SensorId::ArmAngle];
         let new = arm.filter(|arm| self.angle_at != Some(arm.at));
         self.angle_at = arm.map(|arm| arm.at);
         // A frame that fails its parity is no reading.
-        let arm_rad = new.and_then(|arm| angle::decode(arm.code).ok()).map(|code| {
-            let turned = (f64::from(code) - self.angle_zero_code) / 16_384.0;
+        let arm_rad = new.and_then(|arm| Coding::Angle.number(arm.code)).map(|number| {
+            let turned = decode(SensorId::ArmAngle, &self.rig, number) / 360.0;
             TAU * (turned - turned.round())
         });
         Sample {
             counts: self.counts as f64,
-            preload_n: self.preload_sensor_n * bridge(SensorId::PreloadSensor),
-            compression_mm: self.tread_mm * bridge(SensorId::CompressionSensor),
+            preload_n: shown(SensorId::PreloadSensor),
+            compression_mm: shown(SensorId::CompressionSensor),
             arm_rad,
             drive: driven.drive,
             drive_on: driven.drive_on,
@@ -217,9 +204,10 @@ mod tests {
 
     #[test]
     fn codes_become_what_the_sensors_measure() {
+        use crate::plant::sensors::SPAN;
         use interstage::sense::raw::Sample as At;
         let mut reader = Reader::new(&Scenario::default());
-        let bridge = |part: f64| (part * CONVERTER) as u16;
+        let bridge = |part: f64| (part * SPAN) as u16;
         // 2000 + 2048 has seven bits: the parity bit is set.
         let codes = [65_530, bridge(0.475), bridge(0.05), 0x8000 | 4048];
         let mut frame = SensorFrame::taken(0, codes);

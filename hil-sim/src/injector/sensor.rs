@@ -6,8 +6,7 @@
 use std::collections::VecDeque;
 
 use interstage::rig::Rig;
-use interstage::sense::angle::decode;
-use interstage::sense::raw::{AngleFrame, BridgeCode, BridgeCodes, EncoderCount, SensorFrame};
+use interstage::sense::raw::{BridgeCode, BridgeCodes, EncoderCount, SensorFrame};
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
@@ -140,17 +139,15 @@ impl FaultySensor {
             return Some(readback(self.target, &mut codes).map_or(0.0, |code| code.get().into()));
         };
         let code = frame[sensor]?.code;
-        match SENSORS[sensor as usize].coding {
-            Coding::Converter => Some(code.into()),
-            Coding::Angle => decode(AngleFrame::new(code)).ok().map(f64::from),
-            Coding::Counter => {
-                let count = EncoderCount::new(code);
-                let (before, sum) = self.counter.unwrap_or((count, i64::from(code)));
-                let sum = sum + i64::from(count.since(before));
-                self.counter = Some((count, sum));
-                Some(sum as f64)
-            }
+        let coding = SENSORS[sensor as usize].coding;
+        if coding != Coding::Counter {
+            return coding.number(code);
         }
+        let count = EncoderCount::new(code);
+        let (before, sum) = self.counter.unwrap_or((count, i64::from(code)));
+        let sum = sum + i64::from(count.since(before));
+        self.counter = Some((count, sum));
+        Some(sum as f64)
     }
 
     /// Puts in the code nearest to this number.
@@ -196,17 +193,16 @@ mod tests {
     use rand::SeedableRng;
 
     use super::*;
+    use crate::plant::sensors::{decode, encode};
 
     /// What the controller gets of a preload sensor that reads 10, 11, 12 ... N a millisecond.
     fn given(kind: Kind, magnitude: f64) -> Vec<f64> {
         let (rig, preload) = (Rig::prototype(), SensorId::PreloadSensor);
         let mut sensor = FaultySensor::new(Target::Sensor(preload), kind, magnitude, &rig);
         let mut random = ChaCha8Rng::seed_from_u64(1);
-        let (per_n, zero) = (SENSORS[preload as usize].scale)(&rig);
         (0..40u32)
             .map(|tick| {
-                let force = 10.0 + f64::from(tick);
-                let code = (zero + force * per_n).round() as u16;
+                let code = encode(preload, &rig, 10.0 + f64::from(tick)).round() as u16;
                 let mut frame = SensorFrame::default();
                 frame[preload] = Some(Sample { code, at: tick });
                 let t_s = f64::from(tick) * 1e-3;
@@ -216,7 +212,7 @@ mod tests {
                 if sample.at < tick {
                     return f64::NAN;
                 }
-                (f64::from(sample.code) - zero) / per_n
+                decode(preload, &rig, sample.code.into())
             })
             .collect()
     }

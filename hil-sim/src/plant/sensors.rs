@@ -6,7 +6,8 @@ use std::f64::consts::TAU;
 
 use documented::DocumentedFields;
 use interstage::rig::Rig;
-use interstage::sense::raw::{BridgeCode, BridgeCodes, Sample, SensorFrame, SensorId};
+use interstage::sense::angle;
+use interstage::sense::raw::{AngleFrame, BridgeCode, BridgeCodes, Sample, SensorFrame, SensorId};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -32,12 +33,22 @@ impl Coding {
         match self {
             Self::Counter => number.floor() as i64 as u16,
             Self::Converter => number.round().clamp(0.0, SPAN) as u16,
-            Self::Angle => {
-                let bits = (number.round() as i64 & 0x3fff) as u16;
-                bits | (bits.count_ones() as u16 & 1) << 15
-            }
+            Self::Angle => with_parity((number.round() as i64 & 0x3fff) as u16),
         }
     }
+
+    /// The number of a code; none of a frame with wrong parity or the error flag.
+    pub(crate) fn number(self, code: u16) -> Option<f64> {
+        match self {
+            Self::Counter | Self::Converter => Some(code.into()),
+            Self::Angle => angle::decode(AngleFrame::new(code)).ok().map(f64::from),
+        }
+    }
+}
+
+/// A frame of the angle sensor, of 15 bits, with even parity on top.
+pub const fn with_parity(frame: u16) -> u16 {
+    frame & 0x7fff | ((frame << 1).count_ones() as u16 & 1) << 15
 }
 
 /// A sensor of the plant, and how a fault distorts it.
@@ -49,7 +60,7 @@ pub(crate) struct SensorModel {
     noise: fn(&Noise) -> (f64, f64),
     /// Its number in codes, of the quantity and its noise.
     number: fn(&SensorParameters, f64, f64) -> f64,
-    /// Codes of a unit of an offset, and the code of zero.
+    /// Codes of a unit, and the code of zero.
     pub scale: fn(&Rig) -> (f64, f64),
     /// Faults: gain by default; offset by default and at most, its unit and what it does.
     pub faults: (f64, (f64, f64, &'static str, &'static str)),
@@ -58,7 +69,7 @@ pub(crate) struct SensorModel {
 /// Largest code of a converter.
 pub(crate) const SPAN: f64 = 65_535.0;
 /// Codes of a turn of the angle sensor.
-const TURN: f64 = 16_384.0;
+pub(crate) const TURN: f64 = 16_384.0;
 /// Part of the converter's range at which a bridge reads zero.
 const ZERO: f64 = 0.05;
 /// Part of the converter's range at which it reads full scale.
@@ -74,6 +85,18 @@ fn bridge(part: f64) -> f64 {
 /// Codes of a unit, and of zero, of a bridge of this full scale.
 fn bridge_scale(full_scale: f64) -> (f64, f64) {
     ((FULL - ZERO) * SPAN / full_scale, ZERO * SPAN)
+}
+
+/// The number in codes at which a sensor of this rig shows so many mm, N or degrees.
+pub fn encode(sensor: SensorId, rig: &Rig, value: f64) -> f64 {
+    let (per_unit, zero) = (SENSORS[sensor as usize].scale)(rig);
+    zero + value * per_unit
+}
+
+/// What it shows by this number.
+pub fn decode(sensor: SensorId, rig: &Rig, number: f64) -> f64 {
+    let (per_unit, zero) = (SENSORS[sensor as usize].scale)(rig);
+    (number - zero) / per_unit
 }
 
 /// Every sensor, by [`SensorId`].

@@ -5,24 +5,22 @@ use interstage::sense::raw::AngleFrame;
 use interstage::units::Q16;
 
 use super::Columns;
+use crate::plant::sensors::with_parity;
 
-/// Bits of an angle frame: the code, the sensor's error flag, the parity.
+/// Bits of an angle frame: the code, the sensor's error flag.
 pub(super) const ANGLE: u16 = 0x3FFF;
 const ERROR_FLAG: u16 = 1 << 14;
-const PARITY: u16 = 1 << 15;
 
 /// What is wrong with a frame: 1 the sensor's error flag is set, 2 the parity is odd.
 pub(super) fn angle_error(frame: AngleFrame) -> u8 {
     let bits = frame.get();
-    let odd = !bits.count_ones().is_multiple_of(2);
-    u8::from(bits & ERROR_FLAG != 0) | u8::from(odd) << 1
+    u8::from(bits & ERROR_FLAG != 0) | u8::from(bits != with_parity(bits)) << 1
 }
 
 /// The frame of a code and of what is wrong with it.
 pub(super) fn angle_frame(code: u16, error: u8) -> AngleFrame {
-    let bits = code & ANGLE | if error & 1 != 0 { ERROR_FLAG } else { 0 };
-    let odd = !bits.count_ones().is_multiple_of(2);
-    AngleFrame::new(bits | if odd != (error & 2 != 0) { PARITY } else { 0 })
+    let bits = with_parity(code & ANGLE | if error & 1 != 0 { ERROR_FLAG } else { 0 });
+    AngleFrame::new(bits ^ u16::from(error & 2) << 14)
 }
 
 /// A quantity of the controller.

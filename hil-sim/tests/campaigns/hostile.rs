@@ -4,9 +4,10 @@
 //!
 //! Overflow is checked in this build: a sum that wraps by mistake panics.
 
-use super::{at_end, parity};
+use super::at_end;
 use crate::common::RIGS;
 use crate::common::echo::Echo;
+use hil_sim::plant::sensors::with_parity;
 use hil_sim::scenario::{Scenario, ScenarioError};
 use interstage::model::history::History;
 use interstage::model::{Learned, Plan, PlanRequest, Planner, Review};
@@ -136,7 +137,7 @@ fn frame(
         bridges,
         ..SensorFrame::taken(now, [wheel, load, tread, arm])
     };
-    let even = |angle: u16| angle & 0x3FFF | parity(angle & 0x3FFF);
+    let even = |angle: u16| with_parity(angle & 0x3FFF);
     match feed {
         Feed::Least => made(0, 0, 0, 0),
         Feed::Largest => made(u16::MAX, u16::MAX, u16::MAX, u16::MAX),

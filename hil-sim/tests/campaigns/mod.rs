@@ -37,8 +37,3 @@ fn at_end(base: &Scenario, key: &str, end: f64) -> (Scenario, Option<ScenarioErr
     }
     (set(base, key, good).expect("accepted"), Some(refusal))
 }
-
-/// The parity bit of an angle's word.
-fn parity(angle: u16) -> u16 {
-    ((angle.count_ones() & 1) as u16) << 15
-}

@@ -1,7 +1,7 @@
 //! No limit cycles: under constant inputs every filter, observer and loop settles to the last
 //! bit within a stated time, also from the far end of its range.
 
-use super::parity;
+use hil_sim::plant::sensors::with_parity;
 use interstage::control::preload_loop::{PreloadLoop, PreloadLoopState};
 use interstage::control::speed_loop::{SpeedLoop, SpeedLoopState};
 use interstage::estimate::vibration::{VibrationObserver, VibrationState};
@@ -111,7 +111,7 @@ fn loops(rig: &Rig) {
 fn sensed(rig: &Rig) {
     let frame = |at, code: (u16, u16, u16, u16)| SensorFrame {
         bridges: Some(BridgeCodes { drive: BridgeCode::of(0), pretightener: BridgeCode::of(0) }),
-        ..SensorFrame::taken(at, [code.0, code.1, code.2, code.3 | parity(code.3)])
+        ..SensorFrame::taken(at, [code.0, code.1, code.2, with_parity(code.3)])
     };
     let senses = Senses::try_build(rig).expect("a preset");
     // Rolling and loaded, then everything rests.

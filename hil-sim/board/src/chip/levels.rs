@@ -31,6 +31,14 @@ impl Chip {
         self.settle(now);
     }
 
+    /// Presses or releases the button of the emergency stop.
+    pub fn press_stop(&mut self, pressed: bool, now: u64) {
+        let level = self.defects.stop_wire.unwrap_or(pressed);
+        for pin in [Pin::STOP_DRIVE, Pin::STOP_PRELOAD] {
+            self.drive(pin, level, now);
+        }
+    }
+
     /// Turns the wheel encoder's lines to this position, in quarters of a line pair, at a
     /// constant rate over `cycles`.
     pub fn turn_wheel(&mut self, position: i64, cycles: u64) {
@@ -114,7 +122,7 @@ impl Chip {
         for (index, wired) in BRIDGES.iter().enumerate() {
             self.motors[index].set_system_break(broken, now);
             let (stop, _) = wired.stop;
-            let open = self.carries(wired.stop) && self.level(stop) && !self.defects.stop_shorted;
+            let open = self.carries(wired.stop) && self.level(stop);
             self.motors[index].set_break(open, now);
             let floats = index == 0 && self.defects.drive_bridge_floats;
             let out = |pin: Pin| self.ports[pin.0].puts_out(pin.1);

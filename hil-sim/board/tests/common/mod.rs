@@ -13,7 +13,6 @@ use hil_sim::scenario::injection::{Injection, Kind, Target};
 use interstage::restart::Restart;
 use rig_board::bench::{Bench, Passed};
 use rig_board::campaign::{self, Firmware};
-use rig_board::chip::Pin;
 use rig_board::core::Register;
 use rig_board::elf::FLASH;
 use rig_board::faults::switch;
@@ -201,9 +200,7 @@ impl Board {
     /// Opens or closes the contact of the emergency stop.
     pub(crate) fn open_stop(&mut self, open: bool) {
         let now = self.machine().now();
-        for pin in [Pin::STOP_DRIVE, Pin::STOP_PRELOAD] {
-            self.machine().chip_mut().drive(pin, open, now);
-        }
+        self.machine().chip_mut().press_stop(open, now);
     }
 
     pub(crate) fn position_mm(&self) -> f64 {

@@ -6,6 +6,7 @@
 //! read: that read's own answer still has the flag, with the register's content.
 
 use super::Frame;
+use hil_sim::plant::sensors::with_parity;
 
 /// Of a command: read, at this address.
 const READ: u16 = 1 << 14;
@@ -132,11 +133,6 @@ impl AngleSensor {
         };
         with_parity(data | if self.errors == 0 { 0 } else { ERROR })
     }
-}
-
-/// A frame of 15 bits with even parity on top.
-fn with_parity(frame: u16) -> u16 {
-    frame | ((frame.count_ones() & 1) as u16) << 15
 }
 
 #[cfg(test)]
