@@ -218,6 +218,21 @@ pub(crate) fn simulate(
     runs.par_iter().map(|run| run.simulate(coordinates, x)).collect()
 }
 
+/// The coordinates that simulations move, and by how much. `most`: largest friction utilisation.
+fn moves(coordinates: &Coordinates, x: &[f64], most: f64) -> Vec<(usize, f64)> {
+    // Steps by half an element, so that elements meet the corner alike on either side.
+    let by_mm = 0.5 * coordinates.nominal().ring.pitch_mm();
+    let places = coordinates.of_steps().map(|index| (index, by_mm));
+    // Friction by half of what keeps the wheel from slipping at most.
+    let room = 0.5 * (x[FRICTION].exp() / most).ln();
+    let moved = ROWS.iter().enumerate().filter_map(|(index, row)| match row.moves {
+        Moves::Rig(by) if index == FRICTION => Some((index, by.min(room.max(LEAST_MOVED)))),
+        Moves::Rig(by) => Some((index, by)),
+        Moves::Sensors | Moves::Forces => None,
+    });
+    moved.chain(places).collect()
+}
+
 /// Derivatives of what a run's sensors would have shown by each coordinate.
 pub(crate) fn derivatives(
     run: &Run,
@@ -225,17 +240,7 @@ pub(crate) fn derivatives(
     x: &[f64],
     base: &Trajectory,
 ) -> Result<Vec<Channels>, PlantError> {
-    // Steps by half an element, so that elements meet the corner alike on either side.
-    let by_mm = 0.5 * coordinates.nominal().ring.pitch_mm();
-    let places = coordinates.of_steps().map(|index| (index, by_mm));
-    // Friction by half of what keeps the wheel from slipping at most.
-    let room = 0.5 * (x[FRICTION].exp() / base.most_utilisation).ln();
-    let moved = ROWS.iter().enumerate().filter_map(|(index, row)| match row.moves {
-        Moves::Rig(by) if index == FRICTION => Some((index, by.min(room.max(LEAST_MOVED)))),
-        Moves::Rig(by) => Some((index, by)),
-        Moves::Sensors | Moves::Forces => None,
-    });
-    let moves: Vec<(usize, f64)> = moved.chain(places).collect();
+    let moves = moves(coordinates, x, base.most_utilisation);
     let difference = |&(index, by): &(usize, f64)| {
         let moved = |by: f64| {
             let mut x = x.to_vec();
@@ -293,17 +298,21 @@ mod tests {
     use crate::scenario::Scenario;
 
     #[test]
-    fn elements_of_any_ring_meet_a_step_alike_that_is_moved_by_one() {
+    fn elements_of_any_ring_meet_a_step_alike_on_both_sides_to_which_it_is_moved() {
         let mut scenario = Scenario::default();
         scenario.rig.rig.wheel_radius_mm = 40.0;
-        let [still, half, whole] = [0.0, 0.5, 1.0].map(|part| {
-            let mut plant = scenario.plant();
-            let pitch_mm = plant.ring.pitch_mm();
-            plant.wall = plant.wall.moved(&[part * pitch_mm]);
-            let mut rig = VirtualRig::new(plant, 0.0, 40.0, 1e-3);
+        let coordinates = Coordinates::of(&scenario).coarse();
+        let x: Vec<f64> = coordinates.priors().iter().map(|prior| prior.mean).collect();
+        let (step, pitch_mm) = (coordinates.position(0), coordinates.nominal().ring.pitch_mm());
+        let moves = moves(&coordinates, &x, 0.5);
+        let (_, by_mm) = moves.into_iter().find(|(index, _)| *index == step).unwrap();
+        let [low, still, high] = [-by_mm, 0.0, by_mm].map(|by_mm| {
+            let mut x = x.clone();
+            x[step] += by_mm;
+            let mut rig = VirtualRig::new(coordinates.plant(&x), 0.0, 40.0, 1e-3);
             (0..3000).for_each(|_| rig.follow(pitch_mm / 0.03, 40.0, 1e-3).unwrap());
             rig.ledger().crossings()[0].gap_mm
         });
-        assert!((whole - still).abs() < 5e-4 && (half - still).abs() > 2e-3, "{still} {half}");
+        assert!((high - low).abs() < 5e-4 && (still - low).abs() > 2e-3, "{low} {still} {high}");
     }
 }

@@ -140,9 +140,8 @@ mod tests {
         assert!(replay(&run, &Rig::prototype()).unwrap().difference.is_none());
     }
 
-    /// Letters that reach the board: typed in turn, each before one call of read; none while
-    /// the board takes none.
-    fn reached(script: Vec<Next>, typed: &[&[u8]]) -> Vec<u8> {
+    /// Letters that still wait after these were typed, each before one call of read.
+    fn waiting(script: Vec<Next>, typed: &[&[u8]]) -> Vec<u8> {
         let (port, _) = open(script, Duration::from_secs(60));
         let mut source = Probed::new(port);
         for letters in typed {
@@ -156,16 +155,20 @@ mod tests {
     fn a_start_typed_while_the_probe_is_unplugged_is_never_sent() {
         // Lost at the first poll, and away over both calls.
         let away = || std::iter::once(Next::Opens).chain([Next::Unplugged]).collect();
-        assert_eq!(reached(away(), &[b"", b"s", b""]), b"");
+        assert_eq!(waiting(away(), &[b"", b"s", b""]), b"");
         // The cable is pulled as the letter is sent.
-        assert_eq!(reached(away(), &[b"s", b""]), b"");
-        assert_eq!(reached(away(), &[b"", b"x", b""]), b"x");
+        assert_eq!(waiting(away(), &[b"s", b""]), b"");
+        assert_eq!(waiting(away(), &[b"", b"x", b""]), b"x");
     }
 
     #[test]
     fn a_stop_goes_before_whatever_waits() {
-        let full = std::iter::once(Next::Opens).chain((0..200).map(|_| Next::bytes(b"")));
-        assert_eq!(reached(full.collect(), &[b"srx", b""]), b"x");
+        // The board takes nothing, or one letter.
+        for (taken, left) in [(&b""[..], &b"x"[..]), (b"1", b"")] {
+            let full = (0..200).map(|_| Next::bytes(b""));
+            let script = [Next::Opens, Next::bytes(taken)].into_iter().chain(full);
+            assert_eq!(waiting(script.collect(), &[b"srx", b""]), left);
+        }
     }
 
     #[test]
