@@ -1,5 +1,7 @@
 //! Identifies the parameters of a rig from its logs.
 
+use std::ops::RangeInclusive;
+
 pub mod accept;
 pub(crate) mod actuator;
 mod agree;
@@ -12,6 +14,10 @@ pub mod published;
 pub mod record;
 pub mod result;
 pub(crate) mod traces;
+
+/// Seeds of the hidden rigs that set constants of identification, by which nothing is judged: the
+/// widening of intervals, what the ring is off by, and what the pre-tightener's model is.
+pub const CALIBRATION: [RangeInclusive<u64>; 3] = [1..=10, 50_001..=50_016, 7_300_001..=7_600_020];
 
 /// Why nothing was identified.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

@@ -116,9 +116,9 @@ impl RunLine {
 const REPORT_END: [u16; 3] =
     [Limit::StepMissing.code(), Limit::PositionUnconfirmed.code(), Limit::EndOverrun.code()];
 
-/// Slip that is named wrong by more than this, mm, by more than this part of it and by more than two of its
-/// sigmas as stated; distance from the end, mm; and gap over the reference, from which a run that names none
-/// of them is wrong in silence.
+/// Slip that is named wrong by more than this, mm, by more than this part of it and by more than
+/// two of its sigmas as stated; distance from the end, mm; and gap over the reference, from which a
+/// run that names none of them is wrong in silence.
 const UNNAMED: (f64, f64) = (0.5, 0.2);
 const END_MM: f64 = 1.0;
 const GAP: f64 = 1.1;

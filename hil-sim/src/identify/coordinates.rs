@@ -43,9 +43,9 @@ const UNKNOWN_HEIGHT_MM: f64 = 0.5;
 /// its speed, relative: no scenario states them.
 const DRIVE_REL: f64 = 0.01;
 const NO_LOAD_REL: f64 = 0.025;
-/// What the model itself is off by, one sigma, logarithm: the root mean square error on the hidden
-/// rigs of seeds 50,001 to 50,016 that their scatter does not explain. Relaxation and friction are mostly
-/// low, the load high: the forward model is up to 2 um off at a climb.
+/// What the model itself is off by, one sigma, logarithm: the root mean square error on the second
+/// rigs of [`super::CALIBRATION`] that their scatter does not explain. Relaxation and friction are
+/// mostly low, the load high: the forward model is up to 2 um off at a climb.
 pub(crate) const OFF: [(usize, f64); 4] =
     [(CREEP, 0.005), (FRICTION, 0.012), (TAU, 0.010), (LOAD, 0.008)];
 /// Of the compliance along the wall, logarithm: compound and hub make it 0.7 to 1.4 times as much,
@@ -53,9 +53,9 @@ pub(crate) const OFF: [(usize, f64); 4] =
 const COMPLIANCE_LN: f64 = 0.2;
 /// Deviation of where a run begins that an earlier one has ended, mm: a run arrives within 0.5.
 const START_MM: f64 = 0.25;
-/// Elements of the forward model's ring for one of the plant's. Elements meet a corner one by one. Those
-/// of a log do so at places that no model knows. A ring as coarse follows them: friction or load were
-/// outside their intervals in 3 of 96 hidden rigs, with this one in none.
+/// Elements of the forward model's ring for one of the plant's. Elements meet a corner one by one.
+/// Those of a log do so at places that no model knows. A ring as coarse follows them: friction or
+/// load were outside in 3 of 96 hidden rigs, whose seeds were not noted; with this one in none.
 const FINER: usize = 4;
 /// Deviation of a coordinate that is stated without tolerance.
 const EXACT: f64 = 1e-6;

@@ -17,8 +17,8 @@ use super::record::Record;
 use super::traces::Zero;
 use crate::scenario::Scenario;
 
-/// Half-width of an interval in standard deviations: of a rig's 26 values all are within theirs with 95 %,
-/// each with 0.998 (Bonferroni).
+/// Half-width of an interval in standard deviations: of a rig's 26 values all are within theirs
+/// with 95 %, each with 0.998 (Bonferroni).
 pub(super) const WITHIN: f64 = 3.1;
 /// Part of the prior deviation that the logs must leave for a parameter to count as
 /// identified: where nothing was known, and where a tolerance was.

@@ -7,6 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use crate::cli::{code, good_in, object, refused_in, rig_in, stderr};
 use hidden::Line;
+use hil_sim::identify::CALIBRATION;
 use hil_sim::identify::published::{self, AMPLITUDE_MM};
 use hil_sim::scenario::Scenario;
 use hil_sim::testing::long;
@@ -14,16 +15,18 @@ use hil_sim::testing::long;
 #[test]
 fn all_hidden_parameters_of_19_rigs_of_20_lie_within_their_intervals() {
     let cases = if long() { 100 } else { 2 };
+    let judged = 11..=110_u64;
+    assert!(!judged.clone().any(|seed| CALIBRATION.iter().any(|used| used.contains(&seed))));
     let mut lines = BTreeMap::<String, Line>::new();
-    for seed in 11..=10 + cases {
+    for seed in judged.take(cases) {
         hidden::found(seed, |name, of| of(lines.entry(name.to_owned()).or_default()));
     }
     assert_eq!(lines.len(), 19);
     // Two of a hundred rigs have a run that does not start.
-    let least = cases as usize - cases as usize / 20;
+    let least = cases - cases / 20;
     assert!(lines.values().all(|line| line.identified >= least), "{lines:#?}");
     let outside: BTreeSet<_> = lines.values().flat_map(|line| &line.outside).collect();
-    assert!(20 * outside.len() as u64 <= cases, "{outside:?}: {lines:#?}");
+    assert!(20 * outside.len() <= cases, "{outside:?}: {lines:#?}");
     let tread = Scenario::default().rig.tread;
     let values = [tread.k_inf_pa_per_m, tread.stiffening, tread.tau_s];
     for (name, value) in ["k_inf_pa_per_m", "stiffening", "tau_s"].into_iter().zip(values) {
