@@ -49,11 +49,10 @@ pub(crate) fn atomic_write(
     write().map_err(|source| FileError { path: path.to_owned(), what, source })
 }
 
-/// `path` if nothing is there or what is there is the same by `is_same`; else the first of
-/// `name-2`, `name-3` and so on of which this holds, so that nothing is replaced.
-pub(crate) fn vacant(path: &Path, is_same: impl Fn(&Path) -> bool) -> PathBuf {
-    let is_free = |path: &Path| !path.exists() || is_same(path);
-    if is_free(path) {
+/// `path` if no other result is there by `is_other`; else the first of `name-2`, `name-3` and so on
+/// where none is, so that nothing is replaced.
+pub(crate) fn vacant(path: &Path, is_other: impl Fn(&Path) -> bool) -> PathBuf {
+    if !is_other(path) {
         return path.to_owned();
     }
     // A folder's name may have dots.
@@ -63,12 +62,28 @@ pub(crate) fn vacant(path: &Path, is_same: impl Fn(&Path) -> bool) -> PathBuf {
         _ => (&*name, String::new()),
     };
     let numbered = |n: u32| path.with_file_name(format!("{stem}-{n}{ending}"));
-    (2..).map(numbered).find(|path| is_free(path)).unwrap_or_else(|| path.to_owned())
+    (2..).map(numbered).find(|path| !is_other(path)).unwrap_or_else(|| path.to_owned())
 }
 
-/// [`vacant`] for a file with this text.
-pub(crate) fn vacant_for(path: &Path, text: &str) -> PathBuf {
-    vacant(path, |path| fs::read(path).is_ok_and(|there| there == text.as_bytes()))
+/// Where a result goes: as asked for, or to the usual place if that is [`vacant`]. Standard error
+/// names the other result that is there.
+pub(crate) fn place(
+    asked: Option<&Path>,
+    usual: &Path,
+    is_other: impl Fn(&Path) -> bool,
+) -> PathBuf {
+    let place = asked.map_or_else(|| vacant(usual, &is_other), Path::to_owned);
+    if is_other(&place) {
+        eprintln!("{}: replaces another result", place.display());
+    } else if asked.is_none() && place != usual {
+        eprintln!("{} holds another result; this one goes to {}", usual.display(), place.display());
+    }
+    place
+}
+
+/// Whether another text than this is at `path`.
+pub(crate) fn is_other(path: &Path, text: &str) -> bool {
+    path.exists() && fs::read(path).map_or(true, |there| there != text.as_bytes())
 }
 
 /// Writes `text` to `path`; if that fails, the file stays as it was.
@@ -100,15 +115,14 @@ mod tests {
     fn what_is_there_keeps_its_name_unless_it_is_the_same() {
         let directory = tempfile::tempdir().unwrap();
         let at = |name: &str| directory.path().join(name);
-        assert_eq!(vacant_for(&at("a.b.html"), "one"), at("a.b.html"));
-        write_text(&at("a.b.html"), "one").unwrap();
-        assert_eq!(vacant_for(&at("a.b.html"), "one"), at("a.b.html"));
-        assert_eq!(vacant_for(&at("a.b.html"), "two"), at("a.b-2.html"));
-        write_text(&at("a.b-2.html"), "two").unwrap();
-        assert_eq!(vacant_for(&at("a.b.html"), "two"), at("a.b-2.html"));
-        assert_eq!(vacant_for(&at("a.b.html"), "three"), at("a.b-3.html"));
+        let usual = |text| place(None, &at("a.b.html"), |path| is_other(path, text));
+        for (text, name) in [("one", "a.b.html"), ("two", "a.b-2.html"), ("three", "a.b-3.html")] {
+            assert_eq!(usual(text), at(name));
+            write_text(&at(name), text).unwrap();
+            assert_eq!(usual(text), at(name));
+        }
         make_directory(&at("run-tau=0.2")).unwrap();
-        assert_eq!(vacant(&at("run-tau=0.2"), |_| false), at("run-tau=0.2-2"));
+        assert_eq!(vacant(&at("run-tau=0.2"), Path::exists), at("run-tau=0.2-2"));
     }
 
     #[test]

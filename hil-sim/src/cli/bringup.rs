@@ -12,7 +12,6 @@ use crate::bringup::{self, Check, Line, Operator, Progress, Stage, Stdin, gates}
 use crate::files::{make_directory, write_text};
 use crate::identify::record::Record;
 use crate::probe::Port;
-use crate::provision::Extra;
 use crate::record::{log_at, recordings};
 use crate::scenario::Scenario;
 
@@ -70,13 +69,10 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     if let Some(log) = &args.log {
         return crossed(args, &log_at(log));
     }
-    if args.target == "board" {
-        return Err(Failure::Elsewhere(Extra::Board));
-    }
-    if !args.mistake.is_empty() {
+    if args.target != "board" && !args.mistake.is_empty() {
         return Err(Failure::input("--mistake: only the emulated board has mistakes to choose"));
     }
-    carry_out(args, &mut super::probe::reconnecting()?, &mut person(args.yes))
+    carry_out(args, &mut super::probe::reconnecting(&args.target)?, &mut person(args.yes))
 }
 
 /// The person at the terminal.

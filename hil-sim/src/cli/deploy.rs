@@ -12,9 +12,8 @@ use super::output::{self, WithFiles};
 use super::scenario::RunArgs;
 use super::source::TARGETS;
 use super::terminal;
-use crate::files::{vacant, write_text};
+use crate::files::{self, write_text};
 use crate::firmware::FirmwareError;
-use crate::provision::Extra;
 use crate::record::{Recording, Summary};
 use crate::scenario::{Scenario, brief};
 use crate::{progress, record, report, session};
@@ -74,10 +73,9 @@ impl Args {
 pub(crate) fn run(args: &Args) -> Result<Outcome, Failure> {
     let (scenario, directory) = args.resolve()?;
     match args.target.as_str() {
-        "board" => return Err(Failure::Elsewhere(Extra::Board)),
-        "probe" => return looped::on_probe(args, &scenario, directory.as_deref()),
-        _ if args.hil => return Err(Failure::input("--hil: takes --target board")),
-        _ => {}
+        "sil" if args.hil => return Err(Failure::input("--hil: takes --target board")),
+        "sil" => {}
+        _ => return looped::on_board(args, &scenario, directory.as_deref()),
     }
     let recording = {
         let _progress = progress::spinner(scenario.run.direction.name());
@@ -107,26 +105,14 @@ pub(crate) fn conclude(
     Ok(Outcome::of(summary.completed && summary.faults.is_empty()))
 }
 
-/// The folder of this run: `directory`, unless it holds another run. A folder that was asked for
-/// is taken even then, and standard error says so; else the run gets a number behind its name.
+/// The folder of this run: that which was asked for, or `directory` unless it has another run.
 pub fn place(args: &Args, summary: &Summary, directory: &Path) -> PathBuf {
     let ours = identity(serde_json::to_value(summary).ok());
-    let there = |folder: &Path| {
-        let text = std::fs::read(folder.join("summary.json")).ok()?;
-        identity(serde_json::from_slice(&text).ok())
-    };
-    let folder = if args.out.is_some() {
-        directory.to_owned()
-    } else {
-        vacant(directory, |folder| there(folder).is_none() || there(folder) == ours)
-    };
-    let shown = directory.display();
-    if folder != directory {
-        eprintln!("{shown} holds another run; this one goes to {}", folder.display());
-    } else if there(&folder).is_some_and(|there| Some(there) != ours) {
-        eprintln!("{shown}: replaces another run");
-    }
-    folder
+    files::place(args.out.as_deref(), directory, |folder| {
+        let text = std::fs::read(folder.join("summary.json")).unwrap_or_default();
+        let there = identity(serde_json::from_slice(&text).ok());
+        there.is_some() && there != ours
+    })
 }
 
 /// What makes a run the one that it is: its summary without how long it took to compute.

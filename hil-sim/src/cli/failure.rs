@@ -61,6 +61,11 @@ impl Failure {
         Self::Run(error.to_string())
     }
 
+    /// Another part of `rig` runs on this target.
+    pub(super) fn of_target(target: &str) -> Self {
+        Self::Elsewhere(if target == "board" { Extra::Board } else { Extra::Probe })
+    }
+
     pub(crate) fn code(&self) -> ExitCode {
         match self {
             Self::Input(_) => ExitCode::from(2),

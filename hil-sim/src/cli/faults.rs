@@ -80,7 +80,7 @@ pub(crate) fn run(args: &Args) -> Result<Outcome, Failure> {
     }
     let campaign = args.campaign()?;
     if args.target == "board" && !args.campaign.is_given() {
-        return Err(Failure::Elsewhere(crate::provision::Extra::Board));
+        return Err(Failure::of_target(&args.target));
     }
     carry_out(args, &campaign, twin, watched)
 }

@@ -113,13 +113,8 @@ fn write(
     asked: Option<&Path>,
 ) -> Result<Vec<PathBuf>, Failure> {
     let text = found.to_toml();
-    let is_same = |folder: &Path| {
-        std::fs::read(folder.join(FILE)).is_ok_and(|there| there == text.as_bytes())
-    };
-    let directory = asked.map_or_else(|| files::vacant(Path::new(USUAL), is_same), Path::to_owned);
-    if directory.join(FILE).exists() && !is_same(&directory) {
-        eprintln!("{}: replaces another result", directory.join(FILE).display());
-    }
+    let is_other = |folder: &Path| files::is_other(&folder.join(FILE), &text);
+    let directory = files::place(asked, Path::new(USUAL), is_other);
     files::make_directory(&directory)?;
     // The parameters of a rig are in one file, which the gate writes.
     let is_of_rig = directory.join(gates::STATE).exists();

@@ -10,7 +10,7 @@ use interstage::log::identity::fingerprint;
 use serde_json::json;
 
 use super::failure::Failure;
-use crate::files::make_directory;
+use crate::files::{make_directory, vacant};
 use crate::record::{
     Counts, Header, Item, Metadata, WriteError, Writer, recordings, write_metadata,
 };
@@ -62,10 +62,9 @@ impl LogFiles {
         bare: bool,
         scenario: &Scenario,
     ) -> Result<Self, Failure> {
-        let name = free_name(folder, name)?;
+        let mcap = free(folder, name)?;
         make_directory(folder)?;
-        let mcap = folder.join(format!("{name}.mcap"));
-        let csv = (!bare).then(|| folder.join(format!("{name}.csv")));
+        let csv = (!bare).then(|| mcap.with_extension("csv"));
         let table = csv.as_deref().map(created).transpose()?;
         let writer = Writer::new(Some(created(&mcap)?), table, None, !bare);
         let given = (format!("{:08x}", fingerprint(&scenario.rig)), scenario.to_toml());
@@ -155,30 +154,23 @@ fn failed(folder: &Path, error: WriteError) -> Failure {
     Failure::run(format!("{}: {error}", folder.display()))
 }
 
-/// The name of the files: what is there is kept.
-fn free_name(folder: &Path, asked: Option<&str>) -> Result<String, Failure> {
-    let taken = |name: &str| {
-        let all = ["mcap", "csv"].map(|ending| folder.join(format!("{name}.{ending}")));
-        all.into_iter().find(|path| path.exists())
+/// The first of the files: what is there is kept.
+fn free(folder: &Path, asked: Option<&str>) -> Result<PathBuf, Failure> {
+    let taken = |mcap: &Path| {
+        [mcap.to_owned(), mcap.with_extension("csv")].into_iter().find(|path| path.exists())
     };
-    let is_plain = |name: &str| Path::new(name).file_name().is_some_and(|file| file == name);
-    match asked {
-        Some(name) if !is_plain(name) => {
-            Err(Failure::input(format!("--name {name}: a name without a folder is expected")))
+    let Some(name) = asked else {
+        return Ok(vacant(&folder.join("log.mcap"), |mcap| taken(mcap).is_some()));
+    };
+    let mcap = folder.join(format!("{name}.mcap"));
+    let refused = match taken(&mcap) {
+        _ if Path::new(name).file_name().is_none_or(|file| file != name) => {
+            format!("--name {name}: a name without a folder is expected")
         }
-        Some(name) => match taken(name) {
-            Some(path) => {
-                let path = path.display();
-                Err(Failure::input(format!("{path}: is there already; give another --name")))
-            }
-            None => Ok(name.to_owned()),
-        },
-        None => {
-            let numbered = (2..).map(|n: u32| format!("log-{n}"));
-            let mut names = std::iter::once("log".to_owned()).chain(numbered);
-            Ok(names.find(|name| taken(name).is_none()).unwrap_or_default())
-        }
-    }
+        Some(path) => format!("{}: is there already; give another --name", path.display()),
+        None => return Ok(mcap),
+    };
+    Err(Failure::input(refused))
 }
 
 fn created(path: &Path) -> Result<BufWriter<File>, Failure> {

@@ -7,7 +7,6 @@ use super::output;
 use super::parse::distance;
 use crate::bringup::{Line, Operated, Operation, Operator, operate};
 use crate::probe::Port;
-use crate::provision::Extra;
 
 /// The verbs of an operator.
 #[derive(Debug, clap::Subcommand)]
@@ -69,10 +68,7 @@ impl Verb {
 
 /// Runs the verb.
 pub(crate) fn run(verb: &Verb) -> Result<Outcome, Failure> {
-    if verb.parts().1.target == "board" {
-        return Err(Failure::Elsewhere(Extra::Board));
-    }
-    carry_out(verb, &mut super::probe::reconnecting()?)
+    carry_out(verb, &mut super::probe::reconnecting(&verb.parts().1.target)?)
 }
 
 /// Carries it out at this port.

@@ -10,7 +10,6 @@ use super::failure::{Failure, Outcome};
 use super::output;
 use crate::files::write_text;
 use crate::params::{Client, Held, SetFile, Store, StoreError, set_of};
-use crate::provision::Extra;
 use crate::scenario::{KeyInfo, PRESETS, Scenario};
 use crate::table::plain;
 
@@ -98,8 +97,7 @@ struct Printed<'a> {
 pub(crate) fn run(args: &Args) -> Result<Outcome, Failure> {
     match (&args.file, args.target.as_deref()) {
         (Some(file), _) => act(args, &mut SetFile::new(file)),
-        (None, Some("probe")) => act(args, &mut Client::new(super::probe::attach(None)?)),
-        (None, Some(_)) => Err(Failure::Elsewhere(Extra::Board)),
+        (None, Some(target)) => act(args, &mut Client::new(super::probe::attach(target, None)?)),
         (None, None) => Err(Failure::input(
             "whose parameters? give --target probe (a real board), --target board (the \
                  emulated one) or --file FILE",

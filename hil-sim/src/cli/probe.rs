@@ -18,14 +18,20 @@ mod attached {
     const PATIENCE: Duration = Duration::from_secs(120);
 
     /// Attaches to the board, whose channels' control block lies at `block` if that is known.
-    pub(in crate::cli) fn attach(block: Option<u32>) -> Result<RealPort, Failure> {
+    pub(in crate::cli) fn attach(target: &str, block: Option<u32>) -> Result<RealPort, Failure> {
+        is_probe(target)?;
         RealPort::attach(block).map_err(missing)
     }
 
     /// The same, connected again whenever the probe was unplugged.
-    pub(in crate::cli) fn reconnecting() -> Result<ReconnectingPort<'static>, Failure> {
+    pub(in crate::cli) fn reconnecting(target: &str) -> Result<ReconnectingPort<'static>, Failure> {
+        is_probe(target)?;
         ReconnectingPort::open(|| Ok(Box::new(RealPort::attach(None)?)), PAUSE, PATIENCE)
             .map_err(missing)
+    }
+
+    fn is_probe(target: &str) -> Result<(), Failure> {
+        if target == "probe" { Ok(()) } else { Err(Failure::of_target(target)) }
     }
 
     /// A probe that is missing at the start is bad input.
@@ -48,14 +54,17 @@ mod absent {
     /// What the names of probes for this chip have in them, in lower case.
     const NAMES: [&str; 4] = ["stlink", "st-link", "cmsis-dap", "j-link"];
 
-    /// Another binary has probe-rs.
-    pub(in crate::cli) fn attach(_: Option<u32>) -> Result<ReconnectingPort<'static>, Failure> {
-        Err(Failure::Elsewhere(Extra::Probe))
+    /// Other binaries have probe-rs and the emulated board.
+    pub(in crate::cli) fn attach(
+        target: &str,
+        _: Option<u32>,
+    ) -> Result<ReconnectingPort<'static>, Failure> {
+        Err(Failure::of_target(target))
     }
 
     /// See [`attach`].
-    pub(in crate::cli) fn reconnecting() -> Result<ReconnectingPort<'static>, Failure> {
-        attach(None)
+    pub(in crate::cli) fn reconnecting(target: &str) -> Result<ReconnectingPort<'static>, Failure> {
+        attach(target, None)
     }
 
     /// Starts the binary with probe-rs. Where Linux lists no probe, nothing is built for one.

@@ -8,7 +8,7 @@ use serde_json::json;
 use super::failure::{Failure, Outcome};
 use super::output::{self, WithFiles};
 use super::terminal;
-use crate::files::{make_directory, vacant_for, write_text};
+use crate::files::{is_other, make_directory, place, write_text};
 use crate::record::{Recording, Summary, log_at, recordings};
 use crate::report::{
     Difference, animated_svg, beside_svg, compare_html, compared, differences, log_html,
@@ -78,7 +78,8 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
 
 /// Where a page with this text goes: beside the first log a page of another content is kept.
 fn page(args: &Args, log: &Path, ending: &str, text: &str) -> Result<PathBuf, Failure> {
-    let page = args.out.clone().unwrap_or_else(|| vacant_for(&log.with_extension(ending), text));
+    let usual = log.with_extension(ending);
+    let page = place(args.out.as_deref(), &usual, |page| is_other(page, text));
     page.parent().map_or(Ok(()), make_directory)?;
     write_text(&page, text)?;
     Ok(page)

@@ -6,7 +6,6 @@ use std::path::{Path, PathBuf};
 use super::failure::{Failure, Outcome};
 use super::scenario::{RunArgs, remind};
 use crate::bringup::gates;
-use crate::provision::Extra;
 use crate::record::{Bytes, Probed, Source, Virtual};
 use crate::scenario::Scenario;
 
@@ -44,9 +43,8 @@ impl SourceArgs {
         }
         match self.target.as_str() {
             "sil" => act(&mut Virtual::new(&scenario, attended)?, &scenario),
-            "board" => Err(Failure::Elsewhere(Extra::Board)),
-            _ => {
-                let port = super::probe::reconnecting()?;
+            target => {
+                let port = super::probe::reconnecting(target)?;
                 remind("the rig at the probe", &scenario);
                 if let Some(lacking) = gates::lacking(self.run.scenario.file()) {
                     eprintln!("the rig at the probe: {lacking}");

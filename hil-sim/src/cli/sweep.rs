@@ -9,7 +9,7 @@ use super::failure::{Failure, Outcome};
 use super::output;
 use super::scenario::RunArgs;
 use crate::campaign::{AS_GIVEN, Campaign, Column, Frame, column};
-use crate::files::{make_directory, vacant, vacant_for, write_text};
+use crate::files::{is_other, make_directory, place, write_text};
 use crate::scenario::Scenario;
 use crate::session::{self, Options};
 use crate::sweep::{self, Axis, MOST, Plot};
@@ -130,12 +130,9 @@ const PLOTS: [Plot; 3] = [
 
 fn write(args: &Args, rows: &[Row], table: &str) -> Result<Vec<PathBuf>, Failure> {
     let keys: Vec<&str> = args.key.iter().map(|axis| &*axis.key).collect();
-    // Another sweep of these keys keeps its folder.
     let file = |folder: &Path| folder.join("sweep.csv");
-    let directory = args.out.clone().unwrap_or_else(|| {
-        let usual = Path::new("out").join(format!("sweep-deploy-{}", keys.join("-")));
-        vacant(&usual, |folder| vacant_for(&file(folder), table) == file(folder))
-    });
+    let usual = Path::new("out").join(format!("sweep-deploy-{}", keys.join("-")));
+    let directory = place(args.out.as_deref(), &usual, |folder| is_other(&file(folder), table));
     make_directory(&directory)?;
     let mut files = vec![file(&directory)];
     write_text(&files[0], table)?;

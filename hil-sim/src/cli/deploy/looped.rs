@@ -6,14 +6,14 @@ use super::Args;
 use crate::cli::failure::{Failure, Outcome};
 use crate::scenario::Scenario;
 
-/// Without probe-rs: starts a binary that has it.
+/// Without probe-rs, and for the emulated board: starts a binary that has it.
 #[cfg(not(feature = "probe"))]
-pub(super) fn on_probe(_: &Args, _: &Scenario, _: Option<&Path>) -> Result<Outcome, Failure> {
-    Err(Failure::Elsewhere(crate::provision::Extra::Probe))
+pub(super) fn on_board(args: &Args, _: &Scenario, _: Option<&Path>) -> Result<Outcome, Failure> {
+    Err(Failure::of_target(&args.target))
 }
 
 #[cfg(feature = "probe")]
-pub(super) fn on_probe(
+pub(super) fn on_board(
     args: &Args,
     scenario: &Scenario,
     directory: Option<&Path>,
@@ -24,10 +24,10 @@ pub(super) fn on_probe(
     use crate::progress;
 
     // Reported before minutes of building.
-    attach(None)?;
+    attach(&args.target, None)?;
     let path = firmware::build(Profile::Loop)?;
     let image = Image::of(&super::read(&path)?)?;
-    let mut port = attach(Some(image.block))?;
+    let mut port = attach(&args.target, Some(image.block))?;
     if !image.is_on(&mut port).map_err(Failure::run)? {
         let _progress = progress::spinner("flashing the firmware for the loop");
         port.flash(&path).map_err(Failure::run)?;
