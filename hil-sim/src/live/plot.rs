@@ -9,8 +9,8 @@ use ratatui::symbols::Marker;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Axis, Block, Chart, Dataset, GraphType};
 
-use crate::record::Columns;
-use crate::report::axis::extent;
+use crate::record::{Column, Columns};
+use crate::report::axis::{extent, steps};
 use crate::table::label;
 
 /// Time span of the plots, s.
@@ -39,74 +39,38 @@ enum Look {
     Marks,
 }
 
-/// A curve: name, colour, look, value.
-type Curve = (&'static str, Color, Look, fn(&Row) -> f64);
+/// A curve: name, colour, look, points.
+type Curve = (&'static str, Color, Look, Vec<(f64, f64)>);
 
 pub(super) struct Plot {
-    /// Quantity and unit.
+    /// Quantity, which is that of its curves, and unit.
     title: &'static str,
+    colour: Color,
     /// Least span of its axis.
     least: f64,
-    /// Later ones are drawn on top.
-    curves: &'static [Curve],
 }
 
 /// Every plot; a small terminal shows the first four.
 pub(super) const PLOTS: [Plot; 6] = [
-    Plot {
-        title: "speed, mm/s",
-        least: 2.0,
-        curves: &[
-            ("wanted", Color::Reset, Look::Line, |row| row.seen.speed_ref_mm_s),
-            ("measured", Color::Cyan, Look::Line, |row| row.seen.wheel_speed_mm_s),
-        ],
-    },
-    Plot {
-        title: "preload, N",
-        least: 4.0,
-        curves: &[
-            ("wanted", Color::Reset, Look::Line, |row| row.seen.preload_ref_n),
-            ("measured", Color::Magenta, Look::Line, |row| row.seen.preload_n),
-        ],
-    },
-    Plot {
-        title: "gap, mm",
-        least: 1.5,
-        curves: &[
-            ("wanted", Color::Reset, Look::Line, |row| row.gap_ref_mm),
-            ("clearance", Color::Magenta, Look::Dots, |row| row.clearance_mm),
-            ("measured", Color::LightRed, Look::Marks, |row| row.gap_mm),
-        ],
-    },
-    Plot {
-        title: "compression, mm",
-        least: 0.2,
-        curves: &[("measured", Color::Green, Look::Line, |row| row.seen.compression_mm)],
-    },
-    Plot {
-        title: "wheel centre to axis, mm",
-        least: 2.0,
-        curves: &[("by the arm", Color::Magenta, Look::Line, |row| row.seen.radius_mm)],
-    },
-    Plot {
-        title: "slip margin",
-        least: 0.2,
-        curves: &[("estimated", Color::Cyan, Look::Line, |row| row.seen.slip_margin)],
-    },
+    Plot { title: "speed, mm/s", colour: Color::Cyan, least: 2.0 },
+    Plot { title: "preload, N", colour: Color::Magenta, least: 4.0 },
+    Plot { title: GAP, colour: Color::LightRed, least: 1.5 },
+    Plot { title: "compression, mm", colour: Color::Green, least: 0.2 },
+    Plot { title: "radius, mm", colour: Color::Magenta, least: 2.0 },
+    Plot { title: "slip margin", colour: Color::Cyan, least: 0.2 },
 ];
+
+/// The plot of what no quantity of a tick is.
+const GAP: &str = "gap, mm";
 
 impl Plot {
     /// Draws the rows of the last seconds, of which `end_s` is the latest.
     pub(super) fn draw(&self, frame: &mut Frame<'_>, area: Rect, rows: &VecDeque<Row>, end_s: f64) {
-        let points = |of: fn(&Row) -> f64| -> Vec<(f64, f64)> {
-            rows.iter().map(|row| (row.seen.t_s, of(row))).collect()
-        };
-        let lines: Vec<_> = self.curves.iter().map(|(.., of)| points(*of)).collect();
+        let curves = self.curves(rows);
         // Before a step and behind it the clearance is unrelated to the gap.
-        let shown = self.curves.iter().zip(&lines).filter(|(curve, _)| curve.2 != Look::Dots);
-        let fitted = shown.flat_map(|(_, line)| line).map(|point| point.1);
-        let marks = marks(fitted, self.least);
-        let sets = self.curves.iter().zip(&lines).flat_map(|((_, colour, look, _), points)| {
+        let shown = curves.iter().filter(|curve| curve.2 != Look::Dots);
+        let marks = marks(shown.flat_map(|curve| &curve.3).map(|point| point.1), self.least);
+        let sets = curves.iter().flat_map(|(_, colour, look, points)| {
             let (marker, kind) = match look {
                 Look::Line => (Marker::Braille, GraphType::Line),
                 Look::Dots => (Marker::Braille, GraphType::Scatter),
@@ -122,7 +86,7 @@ impl Plot {
         let digits = if marks[1] - low < 1.0 { 2 } else { 0 };
         let begin_s = end_s - SPAN_S;
         let [begin, end] = [begin_s, end_s].map(|at| Line::from(format!("{at:.1} s")));
-        let block = Block::bordered().title(self.title());
+        let block = Block::bordered().title(self.title(&curves));
         let chart = Chart::new(sets.collect())
             .legend_position(None)
             .block(block.title_bottom(begin).title_bottom(end.right_aligned()))
@@ -135,9 +99,31 @@ impl Plot {
         frame.render_widget(chart, area);
     }
 
+    /// The controller's curves of the plot, or those of the gap; later ones are drawn on top.
+    fn curves(&self, rows: &VecDeque<Row>) -> Vec<Curve> {
+        let curve = |name, colour, look, of: &dyn Fn(&Row) -> f64| -> Curve {
+            (name, colour, look, rows.iter().map(|row| (row.seen.t_s, of(row))).collect())
+        };
+        if self.title == GAP {
+            return vec![
+                curve("wanted", Color::Reset, Look::Line, &|row| row.gap_ref_mm),
+                curve("clearance", Color::Magenta, Look::Dots, &|row| row.clearance_mm),
+                curve("measured", self.colour, Look::Marks, &|row| row.gap_mm),
+            ];
+        }
+        let of_plot = |column: &Column| {
+            let (_, name) = column.curve.filter(|(plot, _)| self.title.starts_with(plot))?;
+            let colour = if name == "reference" { Color::Reset } else { self.colour };
+            Some(curve(name, colour, Look::Line, &|row| (column.of)(&row.seen)))
+        };
+        let mut curves: Vec<Curve> = Columns::QUANTITIES.iter().filter_map(of_plot).collect();
+        curves.sort_by_key(|curve| curve.0 != "reference");
+        curves
+    }
+
     /// Quantity, and the names of the curves in their colours.
-    fn title(&self) -> Line<'static> {
-        let legend = self.curves.iter().map(|(name, colour, look, _)| {
+    fn title(&self, curves: &[Curve]) -> Line<'static> {
+        let legend = curves.iter().map(|(name, colour, look, _)| {
             let mark = if *look == Look::Marks { '•' } else { '─' };
             Span::styled(format!(" {mark}{name}"), Style::new().fg(*colour))
         });
@@ -154,9 +140,8 @@ fn marks(values: impl Iterator<Item = f64>, least: f64) -> Vec<f64> {
         let (low, high) = ((low - lacking) / step, (high + lacking) / step);
         ((low + 0.02).floor(), (high - 0.02).ceil())
     };
-    let steps = (-2..6).flat_map(|decade| [1.0, 2.0, 5.0].map(|n| n * 10_f64.powi(decade)));
     let fits = |step: &f64| ends(*step).1 - ends(*step).0 <= INTERVALS;
-    let step = steps.into_iter().find(fits).unwrap_or(1e6);
+    let step = steps(0.01).find(fits).unwrap_or(1e6);
     let (first, last) = ends(step);
     (first as i64..=last as i64).map(|n| n as f64 * step).collect()
 }

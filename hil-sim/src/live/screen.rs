@@ -262,8 +262,8 @@ mod tests {
             "lost 0 frames",
             "ws://127.0.0.1:8765",
             "recorded to out/live/log.mcap",
-            "speed, mm/s ─wanted ─measured",
-            "preload, N ─wanted ─measured",
+            "speed, mm/s ─reference ─estimated",
+            "preload, N ─reference ─measured",
             "gap, mm ─wanted ─clearance •measured",
             "compression, mm ─measured",
             "mode: deployed",
@@ -271,8 +271,7 @@ mod tests {
             "SPACE or x stop",
             "a real drive runs on",
         ];
-        let wide =
-            ["wheel centre to axis, mm ─by the arm", "slip margin ─estimated", "crossing 3 at"];
+        let wide = ["radius, mm ─from the arm angle", "slip margin ─planned", "crossing 3 at"];
         for (width, height, more) in [(80, 24, &wide[..0]), (140, 50, &wide)] {
             let lines = drawn(&Scenario::default(), width, height);
             let text = lines.join("\n");

@@ -68,16 +68,18 @@ fn ticks(range: (f64, f64), most: usize) -> (Vec<f64>, usize) {
     if !(rough.is_finite() && rough > 0.0) {
         return (Vec::new(), 0);
     }
-    let decade = 10_f64.powf(rough.log10().floor());
-    let step = [1.0, 2.0, 5.0, 10.0]
-        .map(|factor| factor * decade)
-        .into_iter()
-        .find(|&step| step >= rough * (1.0 - 1e-9))
-        .unwrap_or(10.0 * decade);
+    let step = steps(rough).next().unwrap_or(rough);
     let first = (range.0 / step - 1e-9).ceil() as i64;
     let last = (range.1 / step + 1e-9).floor() as i64;
     let decimals = (-(step * 1.000_001).log10().floor()).max(0.0) as usize;
     ((first..=last).map(|n| n as f64 * step).collect(), decimals)
+}
+
+/// The steps of 1, 2 and 5 in each decade, from `least` on.
+pub(crate) fn steps(least: f64) -> impl Iterator<Item = f64> {
+    let of = |decade| [1.0, 2.0, 5.0].map(|n| n * 10_f64.powi(decade));
+    let all = (least.log10().floor() as i32..).flat_map(of);
+    all.skip_while(move |step| *step < least * (1.0 - 1e-9))
 }
 
 #[cfg(test)]
@@ -91,10 +93,7 @@ mod tests {
         let labels: Vec<String> = marks.iter().map(|&m| label(m, decimals)).collect();
         assert_eq!(labels, ["1.6", "1.7", "1.8", "1.9"]);
         assert_eq!(ticks((0.0, f64::NAN), 5).0.len(), 0);
-        assert_eq!(
-            ticks((0.0, 0.25), 5),
-            (vec![0.0, 0.05, 0.1, 0.15000000000000002, 0.2, 0.25], 2)
-        );
+        assert_eq!(ticks((0.0, 0.2), 4), (vec![0.0, 0.05, 0.1, 0.15000000000000002, 0.2], 2));
     }
 
     #[test]
