@@ -11,6 +11,7 @@ use std::process::{Command, ExitStatus, Output};
 
 use object::read::elf::ElfFile32;
 use object::{Object, ObjectSection, ObjectSymbol, SectionFlags, SectionKind, elf};
+use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::probe::{Port, PortError};
@@ -229,6 +230,13 @@ fn symbol(file: &ElfFile32<'_>, name: &str) -> Result<u64, FirmwareError> {
     let symbol = file.symbols().find(|symbol| symbol.name() == Ok(name));
     let address = symbol.map(|symbol| symbol.address());
     address.ok_or_else(|| FirmwareError::Image(format!("no symbol {name}")))
+}
+
+/// Cycles with the flash's wait states.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct WithWaits {
+    pub mean: f64,
+    pub worst: u64,
 }
 
 /// Memory of an image, bytes. Its bounds are asserted in `memory.x`.

@@ -183,9 +183,6 @@ impl Scenario {
     }
 
     /// The `count` seeds that follow this one.
-    ///
-    /// # Errors
-    /// If a scenario cannot have the last of them.
     pub(crate) fn seeds(&self, count: u64) -> Result<Vec<u64>, ScenarioError> {
         let seed = self.run.seed;
         let last = seed.checked_add(count).filter(|last| i64::try_from(*last).is_ok());

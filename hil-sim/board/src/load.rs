@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::chip::Stray;
 use super::machine::{Machine, Poll};
 use super::peripherals::HZ;
-use hil_sim::firmware::Footprint;
+use hil_sim::firmware::{Footprint, WithWaits};
 
 /// Cycles from one control tick to the next.
 const PERIOD: u64 = HZ / 1000;
@@ -29,7 +29,7 @@ const STACKS: f64 = 2.0;
 const BANK: u64 = 256 * 1024;
 
 /// Heading of the page's section.
-pub const TITLE: &str = "What it cost on the core";
+pub(crate) const TITLE: &str = "What it cost on the core";
 
 /// Cycles of the control tick's task, a poll each.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
@@ -42,16 +42,9 @@ pub struct Cost {
     pub worst: u64,
     /// Range of its beginnings against an even period, cycles.
     pub jitter: u64,
-    /// Mean and most cycles with the flash's wait states, if they were counted.
+    /// The same with the flash's wait states, see [`super::accelerator`], if they were counted.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub with_waits: Option<WithWaits>,
-}
-
-/// Cycles with the flash's wait states, see [`super::accelerator`].
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct WithWaits {
-    pub mean: f64,
-    pub worst: u64,
 }
 
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -79,13 +72,13 @@ pub struct Load {
 
 /// Measurements during a run.
 #[derive(Debug, Default)]
-pub struct Gathered {
+pub(crate) struct Gathered {
     from: Option<(u64, u64, u64)>,
     ticks: Vec<Poll>,
 }
 
 impl Gathered {
-    pub fn begin(&mut self, machine: &mut Machine) {
+    pub(crate) fn begin(&mut self, machine: &mut Machine) {
         machine.profile.take_polls();
         *self = Self {
             from: Some((machine.now(), machine.profile.slept(), machine.waits())),
@@ -94,7 +87,7 @@ impl Gathered {
     }
 
     /// Takes the polls of the tick's task since the last call.
-    pub fn gather(&mut self, machine: &mut Machine) {
+    pub(crate) fn gather(&mut self, machine: &mut Machine) {
         let tick = machine.tasks.names().position(|name| name == TICK);
         let polls = machine.profile.take_polls();
         if self.from.is_some() {
@@ -103,7 +96,7 @@ impl Gathered {
     }
 
     /// The load from the first command to now.
-    pub fn close(self, machine: &Machine, footprint: &Footprint, stack_used: u32) -> Load {
+    pub(crate) fn close(self, machine: &Machine, footprint: &Footprint, stack_used: u32) -> Load {
         let (from, slept, waits) = self.from.unwrap_or_default();
         let cycles = machine.now() - from;
         let idle = (machine.profile.slept() - slept) as f64 / cycles.max(1) as f64;
@@ -168,7 +161,7 @@ impl Load {
     }
 
     /// As a section of the run's page; `missed` are the budgets that were not kept.
-    pub fn html(&self, missed: &[String]) -> String {
+    pub(crate) fn html(&self, missed: &[String]) -> String {
         let pair = |(name, value)| format!("<div><dt>{name}</dt><dd>{value}</dd></div>\n");
         let cells: String = self.pairs().into_iter().map(pair).collect();
         let missed: String =
@@ -180,7 +173,7 @@ preempts it.</p>\n"
         )
     }
 
-    pub fn text(&self, missed: &[String]) -> String {
+    pub(crate) fn text(&self, missed: &[String]) -> String {
         let pair = |(name, value)| format!("  {name}: {value}\n");
         let pairs: String = self.pairs().into_iter().map(pair).collect();
         let missed: String = missed.iter().map(|line| format!("  over budget: {line}\n")).collect();

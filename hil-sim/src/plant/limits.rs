@@ -39,9 +39,6 @@ pub(crate) const TOWERS: &str = "corner as high as the hub";
 
 impl PlantParameters {
     /// Whether the rig can be run under preloads up to `preload_n`.
-    ///
-    /// # Errors
-    /// The [`Refusal`] that names the parameters and their limit.
     pub(crate) fn check(&self, preload_n: f64) -> Result<(), Refusal> {
         let radius_mm = self.ring.radius_mm;
         let most_mm = DEEPEST * radius_mm;

@@ -143,9 +143,7 @@ fn spacing(scenario: &Scenario, origin: &str) -> Result<(), ScenarioError> {
     if scenario.run.anomalies.is_empty() {
         return Ok(());
     }
-    let geometry = &scenario.rig.rig;
-    let radius = geometry.wheel_radius_mm;
-    let least = (radius * radius - (radius - geometry.step_height_mm).powi(2)).sqrt();
+    let least = scenario.rig.corner_reach_mm();
     let mut first = 0.0;
     for (second, _) in scenario.true_steps() {
         if second - first < least {

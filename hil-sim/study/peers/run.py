@@ -1,7 +1,7 @@
 """One crossing by SciPy's solvers and by MuJoCo, beside the plant's ring: writes results.json, their
 table in docs/PLANT.md and their figure docs/figures/peers.svg.
 
-In a virtual environment with requirements.txt: `python run.py [FOLDER]`, where FOLDER takes the
+In a virtual environment with ../requirements.txt: `python run.py [FOLDER]`, where FOLDER takes the
 compiled equations. `problem.json` has the crossing and the ring's own figures: its settings with
 their errors and times, the gap and force of the converged ring, and the points that MuJoCo's
 contacts are fitted at. Errors are those of gap and largest axial force against the converged

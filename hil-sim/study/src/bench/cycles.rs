@@ -10,6 +10,7 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
+use hil_sim::firmware::WithWaits;
 use hil_sim::provision::{Extra, featured};
 
 /// Calls of one function.
@@ -48,13 +49,6 @@ pub struct Firmware {
     pub worst: u64,
     /// With the flash's wait states.
     pub with_waits: WithWaits,
-}
-
-/// Cycles with the flash's wait states.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct WithWaits {
-    pub mean: f64,
-    pub worst: u64,
 }
 
 /// Rollouts of these crossings and the control tick on the emulated core, which is built first if

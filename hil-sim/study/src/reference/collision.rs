@@ -58,7 +58,7 @@ pub(crate) fn dynamic(case: &ReferenceCase) -> Result<Vec<Sample>, BalanceError>
         Motion { wall, height_mm: y - wall.base_mm, turn_rad: stride / radius, dt_s }
     };
     // Far enough to forget how the wheel was put down, or one turn.
-    let run = (height * (2.0 * radius - height)).sqrt();
+    let run = case.rig.corner_reach_mm();
     let forget = 8.0 * case.rig.tread.tau_s * case.speed_mm_s;
     let settle = (forget + 0.5 * radius).min(7.0 * radius);
     let shown_mm = -run - 0.1 * radius;
