@@ -16,9 +16,9 @@
 //! Source: RM0440, 3.3.3 (wait states) and 3.3.4 (prefetch, instruction and data cache).
 
 /// Bytes that the flash reads at once.
-pub const WORD: u32 = 8;
+pub(crate) const WORD: u32 = 8;
 /// Wait states at 170 MHz in range 1 with boost. Source: RM0440, table of wait states.
-pub const WAIT_STATES: u64 = 4;
+pub(crate) const WAIT_STATES: u64 = 4;
 /// Lines of the caches.
 const CODE_LINES: usize = 32;
 const DATA_LINES: usize = 8;
@@ -76,7 +76,7 @@ const fn place(word: u32) -> (u32, u8) {
 
 /// The flash's interface as the core sees it.
 #[derive(Clone, Debug, Default)]
-pub struct Accelerator {
+pub(crate) struct Accelerator {
     code: Cache<CODE_LINES>,
     data: Cache<DATA_LINES>,
     /// Double word from which the core executes.
@@ -86,12 +86,12 @@ pub struct Accelerator {
     /// Time at which the flash has ended its read.
     free: u64,
     /// Cycles waited so far.
-    pub waits: u64,
+    pub(crate) waits: u64,
 }
 
 impl Accelerator {
     /// The core executes from this double word, `now` textbook cycles after the start.
-    pub fn execute(&mut self, word: u32, now: u64) {
+    pub(crate) fn execute(&mut self, word: u32, now: u64) {
         let word = word & !(WORD - 1);
         if word == self.current {
             return;
@@ -117,7 +117,7 @@ impl Accelerator {
     }
 
     /// The core reads data from this double word.
-    pub fn load(&mut self, word: u32, now: u64) {
+    pub(crate) fn load(&mut self, word: u32, now: u64) {
         let word = word & !(WORD - 1);
         if !self.data.has(word) {
             let mut now = now + self.waits;

@@ -220,13 +220,13 @@ impl<'a> Bench<'a> {
     }
 
     /// Applies the wiring to the chip's pins.
-    pub fn connect(&mut self) {
+    pub(crate) fn connect(&mut self) {
         let now = self.machine.now();
         self.wiring.connect(self.machine.chip_mut(), now);
     }
 
     /// A hand holds the board in reset for so many milliseconds.
-    pub fn hold_reset(&mut self, milliseconds: u32) -> Result<(), BoardError> {
+    pub(crate) fn hold_reset(&mut self, milliseconds: u32) -> Result<(), BoardError> {
         for _ in 0..milliseconds {
             self.machine.restart(Cause::Pin)?;
             self.connect();
@@ -276,7 +276,7 @@ impl<'a> Bench<'a> {
     }
 
     /// Bytes that the board has sent up its binary line.
-    pub fn line_take(&mut self) -> Result<Vec<u8>, BoardError> {
+    pub(crate) fn line_take(&mut self) -> Result<Vec<u8>, BoardError> {
         Ok(self.probe.up(&mut self.machine, 2)?)
     }
 

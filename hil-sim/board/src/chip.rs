@@ -253,7 +253,7 @@ impl Chip {
         self.settle_lines();
     }
 
-    pub fn lock_up(&mut self, now: u64) {
+    pub(crate) fn lock_up(&mut self, now: u64) {
         self.locked_up = true;
         self.settle_pins(now);
         self.advance(now);
@@ -297,7 +297,7 @@ impl Chip {
     }
 
     /// The transfer that DMA makes next.
-    pub fn next_move(&self) -> Option<Move> {
+    pub(crate) fn next_move(&self) -> Option<Move> {
         if self.defects.dma_stalled {
             return None;
         }

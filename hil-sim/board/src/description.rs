@@ -135,7 +135,7 @@ pub fn interrupt(name: &str) -> Option<u8> {
 
 /// Bits that a write to an address can change, and of the bits written as 1 those that no field
 /// has and that are not 1 after reset. An address without a description has no reserved bits.
-pub fn writable(address: u32, ones: u32) -> (u32, u32) {
+pub(crate) fn writable(address: u32, ones: u32) -> (u32, u32) {
     match at(address) {
         Some((_, layouts)) if layouts.clone().next().is_some() => {
             let known = layouts.clone().fold(0, |bits, layout| bits | layout.known | layout.reset);

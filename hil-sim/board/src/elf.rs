@@ -15,7 +15,8 @@ pub const RAM: Memory = Memory { base: 0x2000_0000, size: 128 * 1024, access: Ac
 
 /// The addresses below RAM. The reference manual reserves them, so that an access there may be
 /// answered; here it is, as by RAM. Only the memory protection unit keeps a stack out of them.
-pub const BELOW: Memory = Memory { base: 0x1FFF_8000, size: 32 * 1024, access: Access::Data };
+pub(crate) const BELOW: Memory =
+    Memory { base: 0x1FFF_8000, size: 32 * 1024, access: Access::Data };
 
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Function {
@@ -70,7 +71,7 @@ impl Loaded {
     }
 
     /// Symbols with their values and sizes, in the order of their names.
-    pub fn symbols(&self) -> impl Iterator<Item = (&str, u32, u32)> {
+    pub(crate) fn symbols(&self) -> impl Iterator<Item = (&str, u32, u32)> {
         self.symbols.iter().map(|(name, (value, size))| (name.as_str(), *value, *size))
     }
 

@@ -8,15 +8,15 @@ const COUNT: usize = 16 + 102;
 /// Exceptions with a number of their own in the architecture.
 pub mod number {
     /// Non-maskable interrupt.
-    pub const NMI: u8 = 2;
-    pub const HARD_FAULT: u8 = 3;
-    pub const MEM_MANAGE: u8 = 4;
-    pub const BUS_FAULT: u8 = 5;
-    pub const USAGE_FAULT: u8 = 6;
-    pub const SV_CALL: u8 = 11;
+    pub(crate) const NMI: u8 = 2;
+    pub(crate) const HARD_FAULT: u8 = 3;
+    pub(crate) const MEM_MANAGE: u8 = 4;
+    pub(crate) const BUS_FAULT: u8 = 5;
+    pub(crate) const USAGE_FAULT: u8 = 6;
+    pub(crate) const SV_CALL: u8 = 11;
     /// Pendable service.
-    pub const PEND_SV: u8 = 14;
-    pub const SYS_TICK: u8 = 15;
+    pub(crate) const PEND_SV: u8 = 14;
+    pub(crate) const SYS_TICK: u8 = 15;
     /// First interrupt of the chip.
     pub const INTERRUPT: u8 = 16;
 }
@@ -87,7 +87,7 @@ impl Exceptions {
 
     /// Sets the level of an interrupt line. While it is high the interrupt becomes
     /// pending again as soon as it is not active.
-    pub fn set_line(&mut self, interrupt: u8, high: bool) {
+    pub(crate) fn set_line(&mut self, interrupt: u8, high: bool) {
         let number = number::INTERRUPT + interrupt;
         if !high {
             self.lines &= !(1 << number);
@@ -126,7 +126,7 @@ impl Exceptions {
     }
 
     /// Whether an exception is pending.
-    pub fn is_pending(&self, number: u8) -> bool {
+    pub(crate) fn is_pending(&self, number: u8) -> bool {
         self.pending >> number & 1 != 0
     }
 
@@ -136,12 +136,12 @@ impl Exceptions {
     }
 
     /// How many are active.
-    pub fn depth(&self) -> usize {
+    pub(crate) fn depth(&self) -> usize {
         self.active.len()
     }
 
     /// Sets the priority of an exception, of which the chip keeps the upper four bits.
-    pub fn set_priority(&mut self, number: u8, priority: u8) {
+    pub(crate) fn set_priority(&mut self, number: u8, priority: u8) {
         if let Some(kept) = self.priorities.get_mut(usize::from(number)) {
             *kept = priority & PRIORITY_BITS;
             self.refresh();
@@ -149,18 +149,18 @@ impl Exceptions {
     }
 
     /// The priority of an exception.
-    pub fn priority_set(&self, number: u8) -> u8 {
+    pub(crate) fn priority_set(&self, number: u8) -> u8 {
         self.priorities.get(usize::from(number)).copied().unwrap_or(0)
     }
 
     /// Sets `PRIGROUP`.
-    pub fn set_group(&mut self, group: u8) {
+    pub(crate) fn set_group(&mut self, group: u8) {
         self.group = group & 7;
         self.refresh();
     }
 
     /// `PRIGROUP`.
-    pub fn group(&self) -> u8 {
+    pub(crate) fn group(&self) -> u8 {
         self.group
     }
 
@@ -197,7 +197,7 @@ impl Exceptions {
     }
 
     /// Takes an exception: it runs from now on.
-    pub fn enter(&mut self, number: u8) {
+    pub(crate) fn enter(&mut self, number: u8) {
         self.pending &= !(1 << number);
         self.active.push(number);
         self.event = true;

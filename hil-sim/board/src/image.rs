@@ -13,7 +13,7 @@ const MAILBOX: Memory = Memory { base: 0x6000_0000, size: 1024 * 1024, access: A
 /// Return address of calls: a breakpoint at the mailbox's end.
 const RETURN: u32 = MAILBOX.base + MAILBOX.size - 4;
 /// First address for arguments.
-pub const ARGUMENTS: u32 = MAILBOX.base;
+pub(crate) const ARGUMENTS: u32 = MAILBOX.base;
 /// Longest call, cycles: ten seconds of the chip's time.
 const PATIENCE: u64 = 1_700_000_000;
 const BKPT: [u8; 2] = [0x00, 0xBE];

@@ -22,7 +22,7 @@ pub use profile::{Clock, Poll, Profile};
 pub use tasks::Tasks;
 
 /// Content of every byte of RAM at power-up.
-pub const BLANK: u8 = 0xA5;
+pub(crate) const BLANK: u8 = 0xA5;
 /// Why the core does not execute.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Asleep {
@@ -83,7 +83,7 @@ impl Machine {
     }
 
     /// Counts what the flash's wait states cost from now on, see [`crate::accelerator`].
-    pub fn count_waits(&mut self) -> Result<(), CoreError> {
+    pub(crate) fn count_waits(&mut self) -> Result<(), CoreError> {
         self.core.count_waits(FLASH)
     }
 

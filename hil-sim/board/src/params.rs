@@ -16,7 +16,7 @@ const START_MS: u32 = 3000;
 
 /// Switches a board with this image on, its flash from a file if that is there, and waits until
 /// it is idle.
-pub fn start(elf: &[u8], flash: &Path) -> Result<Bench<'static>, StoreError> {
+pub(crate) fn start(elf: &[u8], flash: &Path) -> Result<Bench<'static>, StoreError> {
     let wire = |error: &dyn std::fmt::Display| StoreError::Wire(error.to_string());
     let strings: &'static Strings =
         Box::leak(Box::new(Strings::of(elf).map_err(|error| wire(&error))?));
@@ -45,7 +45,7 @@ pub fn start(elf: &[u8], flash: &Path) -> Result<Bench<'static>, StoreError> {
 }
 
 /// Keeps the board's flash in the file for the next time.
-pub fn keep(board: &Bench<'_>, flash: &Path) -> Result<(), StoreError> {
+pub(crate) fn keep(board: &Bench<'_>, flash: &Path) -> Result<(), StoreError> {
     let mut bytes = vec![0; 2 * SLOT_BYTES];
     board
         .machine

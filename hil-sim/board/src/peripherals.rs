@@ -45,7 +45,7 @@ pub struct Write {
 
 impl Write {
     /// The register afterwards.
-    pub const fn onto(self, old: u32) -> u32 {
+    pub(crate) const fn onto(self, old: u32) -> u32 {
         old & !self.mask | self.value & self.mask
     }
 

@@ -22,7 +22,7 @@ const LARGEST: u32 = 64 * 1024;
 
 /// A probe with the address of the control block, and what it knows of the channels.
 #[derive(Debug)]
-pub struct Probe {
+pub(crate) struct Probe {
     block: u32,
     channels: Channels<Offsets>,
 }
@@ -46,23 +46,23 @@ struct Ring {
 
 impl Probe {
     /// Finds the control block of the image.
-    pub fn of(machine: &Machine) -> Result<Self, ImageError> {
+    pub(crate) fn of(machine: &Machine) -> Result<Self, ImageError> {
         Ok(Self { block: machine.image.symbol(SYMBOL)?, channels: Channels::default() })
     }
 
     /// Makes the channels unknown until the program sets them up again.
-    pub fn forget(&mut self, machine: &mut Machine) -> Result<(), CoreError> {
+    pub(crate) fn forget(&mut self, machine: &mut Machine) -> Result<(), CoreError> {
         self.channels.forget();
         machine.poke(self.block, &[0; MARK.len()])
     }
 
     /// Takes the bytes that channel `index` has sent.
-    pub fn up(&mut self, machine: &mut Machine, index: u32) -> Result<Vec<u8>, CoreError> {
+    pub(crate) fn up(&mut self, machine: &mut Machine, index: u32) -> Result<Vec<u8>, CoreError> {
         self.channels.up(&mut Link { block: self.block, machine }, index)
     }
 
     /// Sends bytes down channel `index`; returns how many it had room for.
-    pub fn down(
+    pub(crate) fn down(
         &mut self,
         machine: &mut Machine,
         index: u32,

@@ -44,7 +44,7 @@ pub enum Rule {
 impl Rule {
     /// Whether the firmware may break it: embassy-stm32 0.6 ends the division by two in the write
     /// that selects the PLL.
-    pub fn is_accepted(self) -> bool {
+    pub(crate) fn is_accepted(self) -> bool {
         self == Self::ClockStep
     }
 }

@@ -20,7 +20,7 @@ pub struct Spread {
 
 impl Spread {
     /// Adds call number `index`.
-    pub fn note(&mut self, cost: Meter, index: usize) {
+    pub(crate) fn note(&mut self, cost: Meter, index: usize) {
         if self.calls == 0 || cost.cycles < self.min {
             self.min = cost.cycles;
         }

@@ -39,7 +39,7 @@ pub struct Instruction {
 /// Decodes the instruction at the beginning of `code`; `None` if it is cut off there.
 ///
 /// Source: ARMv7-M Architecture Reference Manual, A5 (encodings).
-pub fn decode(code: &[u8]) -> Option<Instruction> {
+pub(crate) fn decode(code: &[u8]) -> Option<Instruction> {
     let half = |at: usize| Some(u16::from_le_bytes([*code.get(at)?, *code.get(at + 1)?]));
     let first = half(0)?;
     Some(if first >> 11 >= 0b11101 {

@@ -23,11 +23,11 @@
 use super::thumb::{Instruction, Kind};
 
 /// Refill of the pipeline after a branch taken.
-pub const REFILL: u64 = 2;
+pub(crate) const REFILL: u64 = 2;
 
 /// Cycles beyond the first that this instruction takes whatever its operands, branches
 /// apart.
-pub const fn extra(kind: Kind) -> u64 {
+pub(crate) const fn extra(kind: Kind) -> u64 {
     match kind {
         Kind::Plain | Kind::IfThen(_) => 0,
         Kind::Access(words) => words as u64,
@@ -41,7 +41,7 @@ pub const fn extra(kind: Kind) -> u64 {
 
 /// Whether the cycles beyond the first are known only at execution: a condition or the
 /// operands decide.
-pub fn is_deferred(instruction: &Instruction, conditional: bool) -> bool {
+pub(crate) fn is_deferred(instruction: &Instruction, conditional: bool) -> bool {
     matches!(instruction.kind, Kind::Divide { .. }) || conditional && extra(instruction.kind) > 0
 }
 
@@ -50,7 +50,7 @@ pub fn is_deferred(instruction: &Instruction, conditional: bool) -> bool {
 ///
 /// The manual says 2 to 12 by the leading zeros and ones of the operands; the
 /// proportion is our reading of it.
-pub const fn division(signed: bool, n: u32, m: u32) -> u64 {
+pub(crate) const fn division(signed: bool, n: u32, m: u32) -> u64 {
     let (n, m) =
         if signed { ((n as i32).unsigned_abs(), (m as i32).unsigned_abs()) } else { (n, m) };
     if m == 0 || n < m {

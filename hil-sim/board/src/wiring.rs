@@ -153,13 +153,13 @@ impl Wiring {
     }
 
     /// The motors' supply is there.
-    pub fn is_supplied(&self) -> bool {
+    pub(crate) fn is_supplied(&self) -> bool {
         let cut = self.stop_pressed && !self.has(Mistake::StopSupply);
         !cut && !self.switched_off && !self.has(Mistake::SupplyOff)
     }
 
     /// Applies what is constant, and the hand, to the chip's pins.
-    pub fn connect(&self, chip: &mut Chip, now: u64) {
+    pub(crate) fn connect(&self, chip: &mut Chip, now: u64) {
         chip.defects.encoder_swapped =
             self.has(Mistake::EncoderSwapped) || self.has(Mistake::BothSwapped);
         chip.defects.drive_bridge_floats = self.has(Mistake::BridgePullDowns);

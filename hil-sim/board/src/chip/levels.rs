@@ -41,7 +41,7 @@ impl Chip {
 
     /// Turns the wheel encoder's lines to this position, in quarters of a line pair, at a
     /// constant rate over `cycles`.
-    pub fn turn_wheel(&mut self, position: i64, cycles: u64) {
+    pub(crate) fn turn_wheel(&mut self, position: i64, cycles: u64) {
         let edges = self.wheel.abs_diff(position);
         for _ in 0..edges {
             self.wheel += (position - self.wheel).signum();
@@ -75,7 +75,7 @@ impl Chip {
 
     /// Voltages at the analogue inputs of the sensors and of the bridges of drive and pre-tightener,
     /// in parts of 2^16 of the reference.
-    pub fn set_analog(&mut self, sensors: [u16; SENSORS], bridges: [u16; 2]) {
+    pub(crate) fn set_analog(&mut self, sensors: [u16; SENSORS], bridges: [u16; 2]) {
         self.inputs[..SENSORS].copy_from_slice(&sensors);
         self.inputs[SENSORS..].copy_from_slice(&bridges);
         self.apply_analog();

@@ -166,13 +166,13 @@ impl<B: Bus + 'static> UnicornCore<B> {
     }
 
     /// The bus, to be changed between two runs.
-    pub fn bus_mut(&mut self) -> &mut B {
+    pub(crate) fn bus_mut(&mut self) -> &mut B {
         &mut self.engine.get_data_mut().bus
     }
 
     /// Sets the places, address and bytes, that the program may not access; everything else in
     /// RAM it may. The host's accesses are not affected.
-    pub fn set_guards(&mut self, guards: Vec<(u32, u32)>) -> Result<(), CoreError> {
+    pub(crate) fn set_guards(&mut self, guards: Vec<(u32, u32)>) -> Result<(), CoreError> {
         for (base, size) in std::mem::replace(&mut self.guards, guards) {
             self.engine.mem_protect(base.into(), size.into(), Prot::ALL)?;
         }
@@ -183,14 +183,14 @@ impl<B: Bus + 'static> UnicornCore<B> {
     }
 
     /// Whether the program may not access some of these bytes.
-    pub fn is_guarded(&self, address: u32, bytes: u32) -> bool {
+    pub(crate) fn is_guarded(&self, address: u32, bytes: u32) -> bool {
         let within = |(base, size): &(u32, u32)| address < base + size && *base < address + bytes;
         self.guards.iter().any(within)
     }
 
     /// Sets the places of flash, address and bytes, whose reads the bus is told of. Slow while
     /// there are some: the engine calls a hook at every read.
-    pub fn set_spoilt(&mut self, spoilt: Vec<(u32, u32)>) -> Result<(), CoreError> {
+    pub(crate) fn set_spoilt(&mut self, spoilt: Vec<(u32, u32)>) -> Result<(), CoreError> {
         if self.engine.get_data().spoilt == spoilt {
             return Ok(());
         }
@@ -215,7 +215,7 @@ impl<B: Bus + 'static> UnicornCore<B> {
 
     /// Counts what the flash's wait states cost from now on, see [`crate::accelerator`]. Slow: the
     /// engine calls a hook at every read.
-    pub fn count_waits(&mut self, flash: Memory) -> Result<(), CoreError> {
+    pub(crate) fn count_waits(&mut self, flash: Memory) -> Result<(), CoreError> {
         self.engine.get_data_mut().count.count_waits();
         let (first, last) = (flash.base.into(), (flash.base + (flash.size - 1)).into());
         self.engine.add_mem_hook(HookType::MEM_READ, first, last, |uc, _, at, _, _| {
@@ -355,7 +355,7 @@ impl<B: Bus + 'static> UnicornCore<B> {
     }
 
     /// Whether the masks let an exception of this priority through.
-    pub fn unmasked(&self, priority: i16) -> bool {
+    pub(crate) fn unmasked(&self, priority: i16) -> bool {
         hooks::unmasked(&self.engine, priority)
     }
 
@@ -381,7 +381,7 @@ impl<B: Bus + 'static> UnicornCore<B> {
     }
 
     /// Cycles and instructions so far.
-    pub fn meter(&self) -> Meter {
+    pub(crate) fn meter(&self) -> Meter {
         self.engine.get_data().count.meter
     }
 
@@ -391,7 +391,7 @@ impl<B: Bus + 'static> UnicornCore<B> {
     }
 
     /// Moves the notes since the last call into `marks`, in their order.
-    pub fn take_marks(&mut self, marks: &mut Vec<Mark>) {
+    pub(crate) fn take_marks(&mut self, marks: &mut Vec<Mark>) {
         marks.append(&mut self.engine.get_data_mut().marks);
     }
 }

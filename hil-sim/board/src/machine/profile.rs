@@ -108,7 +108,7 @@ impl Profile {
         std::mem::take(&mut self.polls)
     }
 
-    pub const fn slept(&self) -> u64 {
+    pub(crate) const fn slept(&self) -> u64 {
         self.slept
     }
 }

@@ -42,11 +42,11 @@ impl Default for Adc {
 
 impl Adc {
     /// Sets the voltage at a converter's input, in parts of 2^16 of the reference.
-    pub fn set_input(&mut self, converter: usize, channel: usize, sixteen: u16) {
+    pub(crate) fn set_input(&mut self, converter: usize, channel: usize, sixteen: u16) {
         self.inputs[converter][channel] = sixteen;
     }
 
-    pub fn wants_dma(&self, converter: usize) -> bool {
+    pub(crate) fn wants_dma(&self, converter: usize) -> bool {
         self.converters[converter].wants_dma()
     }
 
@@ -60,7 +60,7 @@ impl Adc {
     }
 
     /// As [`Peripheral::advance`], with errors at the inputs.
-    pub fn advance_with(&mut self, now: u64, errors: Option<Errors<'_>>) {
+    pub(crate) fn advance_with(&mut self, now: u64, errors: Option<Errors<'_>>) {
         let clock = self.clock();
         for (converter, inputs) in self.converters.iter_mut().zip(&self.inputs) {
             while converter.done <= now {

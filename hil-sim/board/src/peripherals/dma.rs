@@ -11,7 +11,7 @@ use crate::description::dma1::*;
 use crate::description::{DMAMUX, Field, bits, dmamux};
 use crate::rules::Rule;
 
-pub const CHANNELS: usize = 8;
+pub(crate) const CHANNELS: usize = 8;
 
 /// Bytes from a channel's registers to the next's.
 const STRIDE: u32 = CH2_CR - CH1_CR;
@@ -47,7 +47,7 @@ pub struct Dma {
 
 impl Dma {
     /// The transfer that channel `index` makes at a request.
-    pub fn due(&self, index: usize) -> Option<Move> {
+    pub(crate) fn due(&self, index: usize) -> Option<Move> {
         let c = self.channels.get(index)?;
         if !ch1_cr::EN.is_in(c.config) || c.left == 0 {
             return None;
@@ -159,7 +159,7 @@ impl Peripheral for Dma {
 
 /// The request multiplexer. Synchronisation and event generation are not modelled: the count of
 /// their requests has no effect, their flags are zero.
-pub fn multiplexer() -> Registers {
+pub(crate) fn multiplexer() -> Registers {
     use dmamux::ccr0;
     let request = bits(&[ccr0::DMAREQ_ID, ccr0::EGE, ccr0::NBREQ]);
     let channels = (dmamux::CCR0..=dmamux::CCR15).step_by(4).map(|offset| (offset, request));

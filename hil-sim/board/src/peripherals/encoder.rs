@@ -23,7 +23,7 @@ const INVERTED: [Field; 2] = [ccer::CC1P, ccer::CC2P];
 
 /// Cycles for which a level has to last to pass an input filter (`ICxF`, `BKF`) with the
 /// timer's clock.
-pub const fn filter_cycles(setting: u32) -> u64 {
+pub(crate) const fn filter_cycles(setting: u32) -> u64 {
     // Divider of the clock, and samples.
     const FILTERS: [[[u64; 2]; 4]; 4] = [
         [[1, 0], [1, 2], [1, 4], [1, 8]],
@@ -49,7 +49,7 @@ impl Encoder {
     }
 
     /// The lines take these levels for `cycles`; the filter drops shorter ones.
-    pub fn set_lines(&mut self, lines: [bool; 2], cycles: u64) {
+    pub(crate) fn set_lines(&mut self, lines: [bool; 2], cycles: u64) {
         for (line, level) in lines.into_iter().enumerate() {
             let filter = filter_cycles(self.registers.field(FILTER[line]));
             if level != self.lines[line] && cycles >= filter {

@@ -19,7 +19,7 @@ impl Exti {
     }
 
     /// Takes the present levels of the lines: 0 to 15 of pins, 16 of the voltage detector.
-    pub fn sample(&mut self, levels: u32) {
+    pub(crate) fn sample(&mut self, levels: u32) {
         let rising = levels & !self.levels & self.registers.get(RTSR1);
         let falling = !levels & self.levels & self.registers.get(FTSR1);
         self.registers.set(PR1, self.registers.get(PR1) | rising | falling);

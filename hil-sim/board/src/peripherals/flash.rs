@@ -199,7 +199,7 @@ impl Flash {
     }
 
     /// Wait states, see [`super::rcc`].
-    pub fn wait_states(&self) -> u32 {
+    pub(crate) fn wait_states(&self) -> u32 {
         self.registers.field(acr::LATENCY)
     }
 
@@ -223,7 +223,7 @@ impl Flash {
     }
 
     /// Takes the change of a finished operation.
-    pub fn take_change(&mut self) -> Option<Change> {
+    pub(crate) fn take_change(&mut self) -> Option<Change> {
         self.finished.take()
     }
 

@@ -38,7 +38,7 @@ impl Gpio {
         Self { registers, outside }
     }
 
-    pub fn role(&self, pin: u32) -> Role {
+    pub(crate) fn role(&self, pin: u32) -> Role {
         match self.registers.get(MODER) >> (2 * pin) & 3 {
             0 => Role::Input,
             1 => Role::Output,
@@ -64,7 +64,7 @@ impl Gpio {
     }
 
     /// Whether the program drives this pin high.
-    pub fn puts_out(&self, pin: u32) -> bool {
+    pub(crate) fn puts_out(&self, pin: u32) -> bool {
         self.role(pin) == Role::Output && self.level(pin)
     }
 

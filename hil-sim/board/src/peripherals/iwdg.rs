@@ -5,7 +5,7 @@ use super::{HZ, Peripheral, Why, Write};
 use crate::description::{IWDG, bits, iwdg::*};
 
 /// Nominal frequency of its oscillator, Hz.
-pub const LSI_HZ: u64 = 32_000;
+pub(crate) const LSI_HZ: u64 = 32_000;
 
 /// Periods of its oscillator after which a written prescaler or reload value acts.
 const UPDATE: u64 = 5;
@@ -67,12 +67,12 @@ impl Default for Iwdg {
 
 impl Iwdg {
     /// After a reset of the chip: as it came up, with the same oscillator.
-    pub fn after_reset(&self) -> Self {
+    pub(crate) fn after_reset(&self) -> Self {
         Self { lsi_hz: self.lsi_hz, ..Self::default() }
     }
 
     /// Core cycles from a refresh to expiry.
-    pub fn timeout(&self) -> u64 {
+    pub(crate) fn timeout(&self) -> u64 {
         self.acting.cycles(self.lsi_hz)
     }
 
@@ -82,7 +82,7 @@ impl Iwdg {
         self.updated = self.updated.saturating_add(cycles);
     }
 
-    pub const fn has_expired(&self, now: u64) -> bool {
+    pub(crate) const fn has_expired(&self, now: u64) -> bool {
         self.expires <= now
     }
 

@@ -139,7 +139,7 @@ impl Pwm {
     }
 
     /// Sets the level at the break input's pin.
-    pub fn set_break(&mut self, pin: bool, now: u64) {
+    pub(crate) fn set_break(&mut self, pin: bool, now: u64) {
         self.pin = pin;
         self.rearm(now);
     }
@@ -152,7 +152,7 @@ impl Pwm {
         self.update = self.update.saturating_add(cycles);
     }
 
-    pub fn set_system_break(&mut self, level: bool, now: u64) {
+    pub(crate) fn set_system_break(&mut self, level: bool, now: u64) {
         self.system = level;
         self.rearm(now);
     }

@@ -47,22 +47,22 @@ impl Pwr {
     }
 
     /// Output of the detector: it is on and the supply is low.
-    pub fn signals_low(&self) -> bool {
+    pub(crate) fn signals_low(&self) -> bool {
         self.low.is_some() && self.registers.has(cr2::PVDE)
     }
 
     /// Whether the main regulator boosts range 1.
-    pub fn boosts(&self) -> bool {
+    pub(crate) fn boosts(&self) -> bool {
         !self.registers.has(cr5::R1MODE)
     }
 
     /// Whether power is lost.
-    pub fn is_gone(&self, now: u64) -> bool {
+    pub(crate) fn is_gone(&self, now: u64) -> bool {
         self.low.is_some_and(|(until, then)| until <= now && then == Then::Gone)
     }
 
     /// State after a reset of the chip; a lost supply is back.
-    pub fn after_reset(&self, now: u64) -> Self {
+    pub(crate) fn after_reset(&self, now: u64) -> Self {
         let low = self.low.filter(|_| !self.is_gone(now));
         Self { low, ..Self::default() }
     }

@@ -89,7 +89,7 @@ impl Rcc {
     }
 
     /// Whether the clock of a peripheral is on, by its enable bit.
-    pub fn is_clocked(&self, enable: Field) -> bool {
+    pub(crate) fn is_clocked(&self, enable: Field) -> bool {
         self.registers.has(enable)
     }
 
@@ -128,7 +128,7 @@ impl Rcc {
 
     /// The rule that this write to `CFGR` would break, with these wait states of the flash and
     /// the regulator's boost on or off.
-    pub fn broken_rule(
+    pub(crate) fn broken_rule(
         &mut self,
         write: Write,
         wait_states: u32,

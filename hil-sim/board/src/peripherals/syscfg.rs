@@ -24,12 +24,12 @@ impl Syscfg {
     }
 
     /// Whether a locked-up core stops the motor timers.
-    pub fn lockup_breaks(&self) -> bool {
+    pub(crate) fn lockup_breaks(&self) -> bool {
         self.0.has(cfgr2::CLL)
     }
 
     /// Whether two wrong bits in flash do.
-    pub fn flash_breaks(&self) -> bool {
+    pub(crate) fn flash_breaks(&self) -> bool {
         self.0.has(cfgr2::ECCL)
     }
 }

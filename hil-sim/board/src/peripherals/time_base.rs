@@ -51,7 +51,7 @@ impl Default for TimeBase {
 
 impl TimeBase {
     /// Without compare registers.
-    pub fn basic() -> Self {
+    pub(crate) fn basic() -> Self {
         let parts = [(CR1, PLAIN), (DIER, dier::UIE.mask), (ARR, 0xFFFF)];
         let registers = Registers::of(TIM7, &[SR, PSC], &parts, &[CR2, EGR]);
         Self { registers, flags: 1, ..Self::default() }

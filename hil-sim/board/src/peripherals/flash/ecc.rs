@@ -73,7 +73,7 @@ impl Flash {
     }
 
     /// Double words with wrong bits: first address and bytes of each run of them.
-    pub fn spoilt(&self) -> Vec<(u32, u32)> {
+    pub(crate) fn spoilt(&self) -> Vec<(u32, u32)> {
         let mut runs: Vec<(u32, u32)> = Vec::new();
         for &at in self.ecc.words.keys() {
             match runs.last_mut() {
@@ -85,7 +85,7 @@ impl Flash {
     }
 
     /// The core reads these bytes; returns whether two wrong bits were found, which is an NMI.
-    pub fn read_memory(&mut self, address: u32, size: u32) -> bool {
+    pub(crate) fn read_memory(&mut self, address: u32, size: u32) -> bool {
         let from = address & !(WORD - 1);
         let found = self.ecc.words.range(from..address.saturating_add(size));
         let found: Vec<(u32, Wrong)> = found.map(|(at, wrong)| (*at, *wrong)).collect();
@@ -97,7 +97,7 @@ impl Flash {
     }
 
     /// Whether two wrong bits are reported and not yet cleared.
-    pub const fn has_two_wrong_bits(&self) -> bool {
+    pub(crate) const fn has_two_wrong_bits(&self) -> bool {
         eccr::ECCD.is_in(self.ecc.register)
     }
 

@@ -42,7 +42,7 @@ impl Flash {
     }
 
     /// Cause of the reset that is due.
-    pub fn ends_by(&self) -> Option<Cause> {
+    pub(crate) fn ends_by(&self) -> Option<Cause> {
         let pulled = matches!(self.cut, Some(Cut::Pulled(_)));
         self.ends.then_some(if pulled { Cause::Pin } else { Cause::Power })
     }

@@ -71,12 +71,12 @@ impl Default for AngleSensor {
 
 impl AngleSensor {
     /// Takes the magnet away, or brings it back.
-    pub fn set_magnet(&mut self, there: bool) {
+    pub(crate) fn set_magnet(&mut self, there: bool) {
         self.diagnostics = if there { COMPENSATED | 0x80 } else { COMPENSATED | TOO_WEAK | GAIN };
     }
 
     /// The board was reset in the middle of a frame: the select line rose too early.
-    pub fn cut_off(&mut self) {
+    pub(crate) fn cut_off(&mut self) {
         self.errors |= FRAMING;
     }
 

@@ -102,7 +102,7 @@ impl Control {
     }
 
     /// `SLEEPONEXIT`: back in thread mode the core sleeps.
-    pub fn sleeps_on_exit(&self) -> bool {
+    pub(crate) fn sleeps_on_exit(&self) -> bool {
         self.registers.get(SCR) & 2 != 0
     }
 

@@ -76,7 +76,7 @@ impl Mpu {
     }
 
     /// Places without access, address and bytes, if they have changed since the last call.
-    pub fn take_change(&mut self) -> Option<Vec<(u32, u32)>> {
+    pub(crate) fn take_change(&mut self) -> Option<Vec<(u32, u32)>> {
         std::mem::take(&mut self.changed).then(|| {
             let on = self.control & ENABLE != 0;
             let regions = self.regions.iter().filter(|(_, attributes)| on && attributes & 1 != 0);
