@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Part of the project, lines outside tests, lines of tests.
-const BUDGET: [(&str, usize, usize); 2] = [("firmware", 19_700, 10_400), ("host", 48_100, 23_560)];
+const BUDGET: [(&str, usize, usize); 2] = [("firmware", 19_700, 10_400), ("host", 47_500, 23_560)];
 
 /// Lines inside `#[cfg(test)] mod name { ... }`, by the closing brace in the column of `mod`.
 fn inline_tests(text: &str) -> usize {
