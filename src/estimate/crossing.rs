@@ -10,6 +10,7 @@
 mod build;
 mod measure;
 
+pub use self::measure::Measured;
 use self::measure::is_clear;
 use crate::numeric::{LowPass, LowPassState, between, divide, sqrt};
 use crate::units::{Direction, Millimetres, Newtons, Q16, Ratio, Travel, q16};
@@ -108,21 +109,6 @@ pub struct Lift {
     pub gap: Millimetres,
     /// Axial distance between wheel centre and face, mm.
     pub distance: Millimetres,
-}
-
-/// What the wall behind a step shows of the crossing, mm.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Measured {
-    /// Step height; the nominal one if what is measured is not plausible.
-    pub height: Millimetres,
-    /// Gap with that height.
-    pub gap: Millimetres,
-    /// Gap of a wheel as deep in the corner at the nominal height.
-    pub gap_as_table: Millimetres,
-    /// By how much that height changes the distance to the face at the lift.
-    pub shift: Millimetres,
-    /// The measured height lies within [`HEIGHT_MOST`] of the table.
-    pub plausible: bool,
 }
 
 /// What the watch noticed in a tick.

@@ -8,6 +8,21 @@ use crate::units::{Millimetres, Q16, Ratio, Travel, q16};
 /// is as flat, by `d (2 x - d) / 2 R`, and then 0.09 mm below its wall, by `x^2 / 2 R`.
 const FLAT: Travel = q16(1_500_000).widen();
 
+/// What the wall behind a step shows of the crossing, mm.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Measured {
+    /// Step height; the nominal one if what is measured is not plausible.
+    pub height: Millimetres,
+    /// Gap with that height.
+    pub gap: Millimetres,
+    /// Gap of a wheel as deep in the corner at the nominal height.
+    pub gap_as_table: Millimetres,
+    /// By how much that height changes the distance to the face at the lift.
+    pub shift: Millimetres,
+    /// The measured height lies within [`HEIGHT_MOST`] of the table.
+    pub plausible: bool,
+}
+
 impl CrossingWatch {
     /// Place in the kept depths of a wheel that has sunk by `fall`, and the part beyond it.
     fn fall_index(&self, fall: Millimetres) -> Option<(usize, Ratio)> {
