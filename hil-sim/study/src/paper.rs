@@ -11,7 +11,7 @@ mod amplitudes;
 mod case;
 mod cases;
 mod claims;
-mod experiment;
+pub mod experiment;
 mod finite_elements;
 mod histories;
 mod history;

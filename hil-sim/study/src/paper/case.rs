@@ -27,8 +27,8 @@ impl Loads {
 
 /// A deployment at constant speed and preload.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Case {
-    pub loads: Loads,
+pub struct Case {
+    pub(super) loads: Loads,
     /// Axial speed, mm/s.
     pub speed_mm_s: f64,
     /// Radial preload, N.

@@ -49,11 +49,11 @@ pub(super) struct Reading {
 
 /// One deployment.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct Run {
+pub struct Run {
     /// Readings of the three crossings; none of one that was not completed.
-    pub crossings: Vec<Reading>,
+    pub(super) crossings: Vec<Reading>,
     /// The log: what is true at its times.
-    pub log: History,
+    pub(super) log: History,
     /// Largest separation of wheel and wall away from the steps, at the times of the log, mm.
     pub separation_mm: f64,
     /// Contact stages that the controller went through, 1 to 6.
@@ -71,7 +71,7 @@ impl Run {
 
 /// Forty runs of a case.
 #[derive(Clone, Debug)]
-pub(super) struct Experiment {
+pub struct Experiment {
     pub case: Case,
     /// Its runs, by seed from 1.
     pub runs: Vec<Run>,
