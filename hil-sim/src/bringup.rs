@@ -143,6 +143,7 @@ gates! {
             "0.008 mm at most, one sigma" in (0.0, 0.008),
         ANGLE_SENSOR "angle sensor" | "reads its frames" |
             "sound frames, field in range" in (0.99, 1.0),
+        // A magnet off by more moves the wheel's place by over 1.5 mm.
         ANGLE_ZERO "angle zero" | "compares it with the stow end" |
             "within 40 codes; a new magnet's is named" in (0.0, 40.0),
         PRELOAD_LEAD "preload lead" | "you unplug the sensor" |
@@ -158,6 +159,7 @@ gates! {
     /// The drive, wheel free.
     Drive "drive", Some(drive::drive) =>
         DRIVE_BRIDGE "drive bridge" | "15 % for 0.6 s, readback" | "15 %, the other bridge 0",
+        // Ten times what it may count at rest.
         DRIVE_TURNS "drive turns" | "15 % outwards, the encoder" | "counts upwards" in (21.0, MOST),
         DRIVE_DIRECTION "drive direction" | "you look at the wheel" |
             "its wall side goes to the stow end",
@@ -168,6 +170,7 @@ gates! {
             "25 %, the other bridge 0",
         PRELOAD_RISES "preload rises" | "the same" | "preload and compression rise",
         ARM_DIRECTION "arm direction" | "three steps" | "the angle's code grows" in (1.0, MOST),
+        // Beyond, screw, spring or the preload sensor's scale is another one.
         PRELOAD_RATE "preload rate" | "the same" | "half to twice its parameter" in (0.5, 2.0),
         PRELOAD_RELEASED "preload released" | "backwards until slack" |
             "below 2 N, then idle" in (-MOST, 2.0);
@@ -186,8 +189,10 @@ gates! {
             "within 2 %, zero as before" in (0.0, 0.02),
         GAUGE_SCALE "gauge scale" | "the same" | "its parameter, within 5 %" in (0.95, 1.05);
     Friction "friction", Some(pull::run) =>
+        // Between blocked and free.
         PULL_SLIPS "pull slips" | "pressed, 30 % against the stop" |
             "10 to 97 % of its free speed" in (0.1, 0.97),
+        // Rubber on metal, from wet to clean.
         FRICTION "friction" | "the same" | "0.3 to 1.6" in (0.3, 1.6);
     /// A deployment at the least speed, by its log.
     Crossing "first crossing", None =>

@@ -148,7 +148,7 @@ impl Pulls {
     /// Length of the contact, mm: with the wall above an edge, and with the wall below, which bears this part
     /// of the load. On a wall its trailing end lets go early; at an edge that the tread leaves it is cut off.
     /// The lower wall `presses` that end as by so much compression, the leading one by all of the floor's.
-    /// Inwards it is less than a row of elements', which the face meets, too, and more than a bonded layer's.
+    /// Inwards it lies between that of independent elements, which touch the face, too, and of a bonded layer.
     fn contact(
         &self,
         pulled: &Pulled,

@@ -62,7 +62,7 @@ pub struct Bench<'a> {
     frames: Option<Vec<u8>>,
     /// The faults of the scenario, if it has some.
     injector: Option<BoardInjector>,
-    /// Between the pins and the plant; [`Bench::connect`] applies a change of it.
+    /// Between the pins and the plant; `connect` applies a change of it.
     pub wiring: Wiring,
 }
 

@@ -78,7 +78,7 @@ pub enum CoreError {
 /// Cycles and instructions since the start.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Meter {
-    /// Textbook cycles, see [`super::timing`].
+    /// Textbook cycles, see `timing`.
     pub cycles: u64,
     /// Instructions, including those that a condition skips.
     pub instructions: u64,
@@ -99,7 +99,7 @@ impl Meter {
 pub struct Mark {
     /// Cycles so far, including the block that begins there.
     pub cycles: u64,
-    /// Cycles that the flash would have cost so far, see [`super::accelerator`].
+    /// Cycles that the flash would have cost so far, see `accelerator`.
     pub waits: u64,
     pub address: u32,
     pub r0: u32,
@@ -136,7 +136,7 @@ pub trait Bus {
     }
 
     /// Reads or executes bytes of flash of which some are wrong, see
-    /// [`unicorn::UnicornCore::set_spoilt`].
+    /// `UnicornCore::set_spoilt`.
     fn read_spoilt(&mut self, _access: Access) {}
 
     /// Cycle at which something happens by itself; the core stops at the first block after it.

@@ -6,7 +6,7 @@ use interstage::sense::raw::SensorId;
 use interstage::supervise::Mode;
 
 use super::figures::{angle, counted, level, mean, turned};
-use super::line::{Motion, press, silent};
+use super::line::{Motion, press};
 use super::motion::{CHANGED, bridge, driven, fault};
 use super::{Action, BringupError, Check, Session, row};
 
@@ -21,19 +21,20 @@ pub(super) const REST_MS: u32 = 500;
 pub(super) struct Level {
     pub(super) preload: f64,
     pub(super) compression: f64,
-    angle: f64,
+    angle: Option<f64>,
 }
 
 impl Level {
     /// Of the last of these rows.
     pub(super) fn of(rows: &[Record], rig: &Rig) -> Result<Self, BringupError> {
         let last = || rows.iter().rev().take(REST_MS as usize / 2);
-        let first = last().find_map(angle).ok_or_else(silent)?;
-        let angles = mean(last().filter_map(angle).map(|angle| turned(first, angle)));
+        let mean_from = |first| {
+            Some(first + mean(last().filter_map(angle).map(|angle| turned(first, angle)))?.0)
+        };
         Ok(Self {
             preload: level(SensorId::PreloadSensor, rig, last())?,
             compression: level(SensorId::CompressionSensor, rig, last())?,
-            angle: first + angles.ok_or_else(silent)?.0,
+            angle: last().find_map(angle).and_then(mean_from),
         })
     }
 
@@ -41,7 +42,7 @@ impl Level {
         Self {
             preload: self.preload - before.preload,
             compression: self.compression - before.compression,
-            angle: turned(before.angle, self.angle),
+            angle: before.angle.zip(self.angle).map(|(before, now)| turned(before, now)),
         }
     }
 
@@ -51,9 +52,9 @@ impl Level {
 
     fn text(self) -> String {
         let Self { preload, compression, angle } = self;
-        format!(
-            "preload {preload:+.2} N, compression {compression:+.4} mm, angle {angle:+.1} codes"
-        )
+        let angle =
+            angle.map_or_else(|| "unknown".to_owned(), |codes| format!("{codes:+.1} codes"));
+        format!("preload {preload:+.2} N, compression {compression:+.4} mm, angle {angle}")
     }
 }
 
@@ -150,7 +151,7 @@ fn rises(
 fn judge(session: &mut Session<'_, '_>, levels: &[(f64, Level)]) -> Vec<Check> {
     let rig = &session.expected.rig;
     let [(t_1, first), (t_2, second), (t_3, last)] = levels else { return Vec::new() };
-    let inwards = last.angle < 0.0;
+    let inwards = last.angle.is_some_and(|angle| angle < 0.0);
     let advice = if inwards {
         "the arm's codes grow inwards: put the chip at the pivot's other end, then measure \
          sense.angle_zero_code"
@@ -158,7 +159,7 @@ fn judge(session: &mut Session<'_, '_>, levels: &[(f64, Level)]) -> Vec<Check> {
         "the arm's code does not follow the tread's compression: the magnet turns with the arm, \
          and the sensor does not?"
     };
-    let mut checks = vec![row::ARM_DIRECTION.by(Some(last.angle), last.text(), advice)];
+    let mut checks = vec![row::ARM_DIRECTION.by(last.angle, last.text(), advice)];
     // Two durations give rate and dead time, P = slew u (T - D); the outer steps are alike.
     let (short, long) =
         (last.preload - second.preload + first.preload, second.preload - first.preload);

@@ -102,7 +102,9 @@ impl<'a> Trial<'a> {
             }
             last = command.or(last);
             let out = mode == Mode::Complete(Direction::Deploy) && last != Some(Command::Retract);
-            let rests = last.is_some() && mode.is_at_rest() && !out;
+            // A controller that starts again is not at rest yet.
+            let starts = matches!(mode, Mode::Boot | Mode::SelfTest | Mode::Zero);
+            let rests = last.is_some() && mode.is_at_rest() && !starts && !out;
             let over = is_over(rig, t_s, command, rests);
             over_s = if over { over_s + 1e-3 } else { 0.0 };
             (t_s, before) = (rig.time_s(), mode);

@@ -93,8 +93,8 @@ impl Bounds {
     ///   a step the gap bounds it. The reference counts as slowing by the profile.
     /// - Gap: as in a run that reports nothing. A wheel that slips lifts off as it slides, and the
     ///   reference is that of the table's steps alone.
-    /// - End: the room before the end stop, the same on every virtual rig, where a wheel ends whose encoder went wrong on the
-    ///   last millimetres.
+    /// - End: the room before the end stop, which is the same on every virtual rig. There a wheel
+    ///   ends whose encoder went wrong on the last millimetres.
     fn of(rig: &Rig, slips: bool, strange_step: bool) -> Self {
         let (preload, drive, rig_mm) = (&rig.preload, &rig.drive, &rig.rig);
         let trips_n = preload.limit_n * (1.0 + OVERPRESSURE_PART) / (1.0 - rig.sense.preload_error);

@@ -39,7 +39,7 @@ const MOVED_LOST: f64 = 1e-3;
 const FIRST_N: f64 = 0.1;
 const LEAST_N: f64 = 1e-4;
 /// What the model is off by, one sigma, ms and logarithm: the root mean square error on 76 hidden
-/// rigs on the emulated board, of the last seeds of [`super::CALIBRATION`]. By scatter alone two of
+/// rigs on the emulated board, of the last range of [`super::CALIBRATION`]. By scatter alone two of
 /// 20 others had 0.6 and 0.8 % for a lag that was 2.3 and 3 % off.
 const OFF: [(usize, f64); 2] = [(DELAY, 0.6), (LAG, 0.011)];
 

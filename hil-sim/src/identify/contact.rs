@@ -25,7 +25,7 @@ const BLOCKS: [usize; 3] = [16, 16, 4];
 /// By how much the scatter of the blocks is widened. Some nine crossings determine steps,
 /// friction and wheel: Student's t with eight degrees of freedom in place of the normal
 /// quantile, 1.18. And the model has an error common to all crossings, the jitter of the
-/// drive's load between two counts, which raises the creep: 1.9, by the first seeds of
+/// drive's load between two counts, which raises the creep: 1.9, by the first range of
 /// [`super::CALIBRATION`].
 const WIDENED: f64 = 1.18 * 1.9;
 /// Deviation of friction while nothing determines it, logarithm.

@@ -43,8 +43,8 @@ const UNKNOWN_HEIGHT_MM: f64 = 0.5;
 /// its speed, relative: no scenario states them.
 const DRIVE_REL: f64 = 0.01;
 const NO_LOAD_REL: f64 = 0.025;
-/// What the model itself is off by, one sigma, logarithm: the root mean square error on the second
-/// rigs of [`super::CALIBRATION`] that their scatter does not explain. Relaxation and friction are
+/// What the model itself is off by, one sigma, logarithm: the root mean square error on rigs
+/// of the second range of [`super::CALIBRATION`] that their scatter does not explain. Relaxation and friction are
 /// mostly low, the load high: the forward model is up to 2 um off at a climb.
 pub(crate) const OFF: [(usize, f64); 4] =
     [(CREEP, 0.005), (FRICTION, 0.012), (TAU, 0.010), (LOAD, 0.008)];

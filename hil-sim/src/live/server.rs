@@ -28,7 +28,8 @@ const PROTOCOLS: [&str; 2] = ["foxglove.websocket.v1", "foxglove.sdk.v1"];
 const WAITING: usize = 4096;
 /// Longest wait for a client's request between two messages to it.
 const LISTEN: Duration = Duration::from_millis(5);
-/// Longest wait for a client to send its handshake: so long can silent ones keep others out.
+/// Longest wait for each part of a client's handshake, some hundred times what a network takes: so long
+/// can silent clients keep others out.
 const HANDSHAKE: Duration = Duration::from_secs(1);
 /// Longest wait for a client to take a message.
 const PATIENCE: Duration = Duration::from_secs(5);
@@ -337,12 +338,12 @@ mod tests {
         let _silent: Vec<TcpStream> =
             (0..MOST).map(|_| TcpStream::connect(server.address()).unwrap()).collect();
         let mut late = TcpStream::connect(server.address()).unwrap();
-        late.set_read_timeout(Some(HANDSHAKE / 2)).unwrap();
+        late.set_read_timeout(Some(HANDSHAKE)).unwrap();
         // It is closed at once.
         assert_eq!(io::Read::read(&mut late, &mut [0]).expect("closed"), 0);
         assert_eq!(server.clients(), 0);
         thread::sleep(2 * HANDSHAKE);
-        assert!(connect(&server, PROTOCOLS[0]).is_some());
+        assert!((0..50).any(|_| connect(&server, PROTOCOLS[0]).is_some()));
     }
 
     #[test]

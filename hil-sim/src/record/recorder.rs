@@ -77,7 +77,7 @@ impl RunRecorder {
         if let Some(controller) = columns {
             self.rows.push(Row { controller, truth: Some(truth.into()) });
         }
-        self.close_tick(at, telemetry, Some(truth));
+        self.close_tick(at, telemetry, (truth.position_mm, truth.preload_n), truth.separation_mm);
     }
 
     /// Takes an event of the tick of this number.
@@ -102,12 +102,16 @@ impl RunRecorder {
         }
     }
 
-    /// Ends the tick of this number: position and preload are the true ones, or as measured.
-    pub(super) fn close_tick(&mut self, at: u32, seen: &Telemetry, truth: Option<&Truth>) {
+    /// Ends the tick of this number; position and preload, mm and N, are the true ones, or as measured;
+    /// `separation_mm` from the wall, 0 where it is unknown.
+    pub(super) fn close_tick(
+        &mut self,
+        at: u32,
+        seen: &Telemetry,
+        (position_mm, preload_n): (f64, f64),
+        separation_mm: f64,
+    ) {
         let t_s = f64::from(at) * TICK_S;
-        let measured = (seen.position.to_num(), seen.preload.to_num(), 0.0);
-        let (position_mm, preload_n, separation_mm) =
-            truth.map_or(measured, |t| (t.position_mm, t.preload_n, t.separation_mm));
         let mode = mode_number(seen.mode);
         self.split.add(t_s, mode, position_mm);
         if MOVES.contains(&mode) {

@@ -99,7 +99,8 @@ fn measured(run: &Run) -> Recording {
             recorder.event(entry.at, &entry.event);
         }
         recorder.rows.push(Row { controller: *row, truth: None });
-        recorder.close_tick(row.tick, &row.telemetry().unwrap_or_default(), None);
+        let measured = (row.position_mm, row.preload_n);
+        recorder.close_tick(row.tick, &row.telemetry().unwrap_or_default(), measured, 0.0);
     }
     // The end of a run that a restart or a cut follows at once is in the log's lines alone.
     events.for_each(|entry| recorder.event(entry.at, &entry.event));

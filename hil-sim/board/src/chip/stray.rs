@@ -76,7 +76,7 @@ impl Strays {
         self.0.values()
     }
 
-    /// Those for which there is a reason: [`crate::rules::Rule::is_accepted`], and the time
+    /// Those for which there is a reason: `Rule::is_accepted`, and the time
     /// driver's flags.
     pub fn accepted(&self) -> impl Iterator<Item = &Stray> {
         self.1.values()

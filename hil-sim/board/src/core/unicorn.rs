@@ -226,7 +226,7 @@ impl<B: Bus + 'static> UnicornCore<B> {
         Ok(self.engine.ctl_flush_tb()?)
     }
 
-    /// Cycles that the flash would have cost since [`UnicornCore::count_waits`].
+    /// Cycles that the flash would have cost since `count_waits`.
     pub fn waits(&self) -> u64 {
         self.engine.get_data().count.waits()
     }

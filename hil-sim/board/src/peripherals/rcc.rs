@@ -2,7 +2,7 @@
 //! reset switches, and the cause of the last reset.
 //!
 //! The core runs at the clock that is in use; timers count the full one from the start. The clocks
-//! that the program sets up are checked, see [`Rcc::broken_rule`].
+//! that the program sets up are checked, see `Rcc::broken_rule`.
 //!
 //! Source: RM0440, 7.2 (clocks) and 7.4 (registers); times: DS12288, clock source
 //! characteristics.
