@@ -115,7 +115,7 @@ fn bring_up(args: &bringup::Args) -> Result<Outcome, Failure> {
     let scenario = args.scenario()?.unwrap_or_default();
     let (elf, strings) = image(&scenario)?;
     let mut bench = Bench::wired(&elf, &strings, &scenario, &mistakes).map_err(Failure::run)?;
-    run::store(&mut bench.machine, &scenario).map_err(Failure::run)?;
+    crate::params::store(&mut bench.machine, &scenario).map_err(Failure::run)?;
     let mut board = Attended::new(bench);
     let mut person = board.person(bringup::person(args.yes));
     bringup::carry_out(args, &mut board, &mut person)

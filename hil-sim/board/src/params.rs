@@ -3,16 +3,41 @@
 use std::fs;
 use std::path::Path;
 
-use interstage::params::slots::SLOT_BYTES;
+use interstage::params::CompileError;
+use interstage::params::slots::{SLOT_BYTES, slot_image};
+use interstage::rig::Rig;
 
 use crate::bench::Bench;
 use crate::chip::map::PARAMETER_SETS;
+use crate::error::BoardError;
 use crate::log::Strings;
-use hil_sim::params::StoreError;
+use crate::machine::Machine;
+use hil_sim::faults::sets;
+use hil_sim::params::{StoreError, set_of};
 use hil_sim::scenario::Scenario;
+use hil_sim::scenario::injection::{Injection, Target};
 
 /// Longest start-up, ms.
 const START_MS: u32 = 3000;
+
+/// Stores the parameters of a rig that is not the image's own in the board's flash, as `rig
+/// params` does. For a fault of stored parameters any rig is stored, with another one in the
+/// spare slot.
+pub(crate) fn store(machine: &mut Machine, scenario: &Scenario) -> Result<(), BoardError> {
+    let of_sets = |fault: &Injection| fault.target.is_of_sets();
+    let mut faults = scenario.run.faults.iter().filter(|fault| of_sets(fault));
+    if faults.any(|fault| fault.target != Target::ImageSet) {
+        machine.poke(PARAMETER_SETS, &sets::places(scenario)?)?;
+        return Ok(());
+    }
+    if scenario.rig == Rig::prototype() {
+        return Ok(());
+    }
+    let set = set_of(&scenario.preset, &scenario.rig)?;
+    let place = slot_image(&set, 1).ok_or(CompileError::Room)?;
+    machine.poke(PARAMETER_SETS, &place)?;
+    Ok(())
+}
 
 /// Switches a board with this image on, its flash from a file if that is there, and waits until
 /// it is idle.

@@ -8,16 +8,10 @@ use super::error::BoardError;
 use super::load::{Gathered, Load};
 use super::log::{Line, Strings};
 use super::machine::Machine;
-use interstage::params::{CompileError, slots};
-use interstage::rig::Rig;
 use interstage::supervise::Mode;
 
-use crate::chip::map::PARAMETER_SETS;
-use hil_sim::faults::sets;
 use hil_sim::firmware::Footprint;
-use hil_sim::params::set_of;
 use hil_sim::record::{JoinedLog, LogLine, Recording};
-use hil_sim::scenario::injection::{Injection, Target};
 use hil_sim::scenario::{ControllerKind, Scenario};
 use hil_sim::session::{RunningRig, drive, is_over, longest_s, once};
 
@@ -40,25 +34,6 @@ pub fn check(scenario: &Scenario) -> Result<(), BoardError> {
     if scenario.run.controller != ControllerKind::Scheduled {
         return Err(BoardError::Controller(scenario.run.controller.name().to_owned()));
     }
-    Ok(())
-}
-
-/// Stores the parameters of a rig that is not the image's own in the board's flash, as `rig
-/// params` does. For a fault of stored parameters any rig is stored, with another one in the
-/// spare slot.
-pub(crate) fn store(machine: &mut Machine, scenario: &Scenario) -> Result<(), BoardError> {
-    let of_sets = |fault: &Injection| fault.target.is_of_sets();
-    let mut faults = scenario.run.faults.iter().filter(|fault| of_sets(fault));
-    if faults.any(|fault| fault.target != Target::ImageSet) {
-        machine.poke(PARAMETER_SETS, &sets::places(scenario)?)?;
-        return Ok(());
-    }
-    if scenario.rig == Rig::prototype() {
-        return Ok(());
-    }
-    let set = set_of(&scenario.preset, &scenario.rig)?;
-    let place = slots::slot_image(&set, 1).ok_or(CompileError::Room)?;
-    machine.poke(PARAMETER_SETS, &place)?;
     Ok(())
 }
 

@@ -84,7 +84,7 @@ fn in_the_loop(
 ) -> Result<Outcome, Failure> {
     let elf = firmware::image(Profile::Loop)?;
     let mut port = EmulatedPort::new(&elf).map_err(Failure::run)?;
-    run::store(&mut port.machine, scenario).map_err(Failure::run)?;
+    crate::params::store(&mut port.machine, scenario).map_err(Failure::run)?;
     looped::close(args, &mut port, scenario, directory, "board")
 }
 
