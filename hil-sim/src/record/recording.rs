@@ -245,6 +245,10 @@ mod tests {
         assert!(mean < 50.0, "{mean} bytes a tick");
         let page = crate::report::html(&believed, &[]);
         assert!(page.contains("Deployed") && !page.contains("NaN"), "{}", &page[..2000]);
+        // A quantity that the log lacks is unknown.
+        let mut lacking = Run::of_stream(&truth.stream);
+        lacking.rows.iter_mut().for_each(|row| row.preload_n = f64::NAN);
+        assert!(measured(&lacking).summary.mean_preload_n.is_nan());
     }
 
     fn log(messages: &[(Topic, Value)]) -> Vec<u8> {
